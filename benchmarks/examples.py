@@ -32,11 +32,11 @@ def one(example: Example, name: str) -> dict[str, float | str]:
         cert = certify(graph, protocol, initial, asks=asks)
         verdict = cert.verdict
         seconds.append(time.process_time() - begin)
-    assert cert.rate is not None and cert.overshoot is not None and cert.proof.rate is not None
+    assert cert.rate is not None and cert.overshoot is not None and cert.paper_rate is not None
     return {
         "seconds": statistics.median(seconds),
         "rate": float(cert.rate),
-        "paper": float(cert.proof.rate),
+        "paper": float(cert.paper_rate),
         "overshoot": float(cert.overshoot),
         "ratio": cert.comparison.worst_ratio if cert.comparison else float("nan"),
         "verdict": verdict,

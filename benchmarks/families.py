@@ -21,8 +21,11 @@ from typing import Any
 import numpy as np
 
 from ptcc_certify import NominalProtocol, read_graph
-from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate, certify_family
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.family_proof import ComponentProof
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.graphs.family import Family
+from ptcc_certify.model.asks import Asks
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from common_kernel_families import KINDS, random_family
@@ -45,17 +48,17 @@ def ensemble(count: int) -> Iterator[tuple[str, Family]]:
         yield kind, random_family(rng, kind, n, modes, share, OPTIONAL[seed // 5 % 2])
 
 
-def ratio(certificate: FamilyCertificate) -> float:
+def ratio(certificate: Certificate) -> float:
     """Return the least ratio of the components in which something moves; 0 where no rate is proved."""
     parts = [part for part in certificate.parts if part.component.nodes.size > 1]
     ratios = [float(p.rate / p.upper_bound.value) if p.rate and p.upper_bound else 0.0 for p in parts]
     return min(ratios, default=float("nan"))
 
 
-def certified(family: Family, limit: float) -> tuple[FamilyCertificate, float]:
+def certified(family: Family, limit: float) -> tuple[Certificate, float]:
     """Return the certificate and the seconds it took."""
     begin = time.perf_counter()
-    certificate = certify_family(family, PROTOCOL, [1] * family.n_nodes, time_limit=limit)
+    certificate = certify(family, PROTOCOL, [1] * family.n_nodes, asks=Asks(time_limit=limit))
     assert certificate.verdict in ("certified", "undecided")
     return certificate, time.perf_counter() - begin
 

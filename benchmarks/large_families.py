@@ -14,11 +14,12 @@ import resource
 import time
 from fractions import Fraction
 
+from ptcc_certify.certificate.procedure import certify
+
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.weights import Weights
@@ -69,7 +70,7 @@ def one(n: int, uncertainty: str) -> None:
     print(f"  followers: rate {float(decay.rate):.6g}, {ratio:.7f} of the largest; {search:.1f} s, proof {exact:.2f} s")
     protocol = NominalProtocol(T=1, rho1=1, rho2=30, kappa=3)
     start = time.process_time()
-    certificate = certify_family(family, protocol, [k % 7 for k in range(n)])
+    certificate = certify(family, protocol, [k % 7 for k in range(n)])
     _, files = certificate.for_check()
     made, memory = time.process_time() - start, megabytes()
     start = time.process_time()

@@ -23,7 +23,7 @@ def certify(**options: Any) -> Any:
 BY_PLACE_TOO: dict[str, Callable[[], Callable[[Any], Any]]] = {
     "influence": lambda: ptcc.influence(GRAPH).row,
     "influence of a certificate": lambda: certify().influence.row,
-    "final states of a family": lambda: ptcc.certify(FAMILY, PROTOCOL, X0).final_states.__getitem__,
+    "final states of a family": lambda: ptcc.certify(FAMILY, PROTOCOL, X0).final_state.__getitem__,
     "kernel of a family": lambda: ptcc.decide(FAMILY)[0].kernel.row,
     "rows of the Laplacian": lambda: lambda agent: GRAPH.exact_rows([agent]),
 }

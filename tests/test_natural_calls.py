@@ -270,16 +270,16 @@ FAMILIES = {
     "ptcc.Family.switching(modes=[day])": "Family(2 nodes",
     "ptcc.certify([edges, edges], p)": '... a dict, {"day": edges, "night": edges2}',
     "ptcc.certify([edges, edges, edges], p)": '... a dict, {"day": edges, "night": edges2}',
-    "ptcc.certify({'day': edges, 'night': edges}, p)": "FamilyCertificate(bipartite consensus for every signal",
+    "ptcc.certify({'day': edges, 'night': edges}, p)": "Certificate(bipartite consensus for every signal",
     "ptcc.as_family({'day': edges, 'typo': [('ann', 'bbo', 1), ('ann', 'eve', 1)]})": "... has; did you mean bob?",
-    "ptcc.certify(day, p, [1, 2]).final_states": "FinalEnds(ann in [-0.500001, 0.100001], bob in [-0.10",
-    "ptcc.certify(day, p, [1, 2]).final_states['ann'] == ptcc.certify(day, p, [1, 2]).final_states[0]": "True",
-    "ptcc.certify(day, p, [1, 2]).final_states['joe']": "UnknownAgentError: no agent is called 'joe'",
-    "ptcc.certify(day, p, [1, 2]).final_states[::-1][0] == ptcc.certify(day, p, [1, 2]).final_states['bob']": "True",
-    "copy.deepcopy(ptcc.certify(day, p, [1, 2]).final_states)['bob'] == ptcc.certify(day, p, [1, 2]).final_states[1]": (
+    "ptcc.certify(day, p, [1, 2]).final_state": "FinalEnds(ann in [-0.500001, 0.100001], bob in [-0.10",
+    "ptcc.certify(day, p, [1, 2]).final_state['ann'] == ptcc.certify(day, p, [1, 2]).final_state[0]": "True",
+    "ptcc.certify(day, p, [1, 2]).final_state['joe']": "UnknownAgentError: no agent is called 'joe'",
+    "ptcc.certify(day, p, [1, 2]).final_state[::-1][0] == ptcc.certify(day, p, [1, 2]).final_state['bob']": "True",
+    "copy.deepcopy(ptcc.certify(day, p, [1, 2]).final_state)['bob'] == ptcc.certify(day, p, [1, 2]).final_state[1]": (
         "True"
     ),
-    "ptcc.certify(day, p)": "FamilyCertificate(bipartite consensus for every signal",
+    "ptcc.certify(day, p)": "Certificate(bipartite consensus for every signal",
     "ptcc.certify(day, p).plot()": "ParameterError: the certificate has no initial state; certify the family with x0",
     "ptcc.certify(day, p, [1, 2]).plot('graph')": "Axes",
     "ptcc.certify(day, p, [1, 2]).plot('spectrum')": "ParameterError: eigenvalues of single graphs do not tell what",

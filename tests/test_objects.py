@@ -77,7 +77,7 @@ def test_a_copy_of_a_graph_can_no_more_be_written_to_than_the_graph(cert):
 
 
 def test_parts_of_a_certificate_have_a_hash(cert):
-    parts = cert.effort, cert.proof, cert.search, cert.observed, cert.comparison, cert.obligations, cert.request
+    parts = cert.effort, cert.paper_proof, cert.search, cert.observed, cert.comparison, cert.obligations, cert.request
     assert len({*parts, copy.deepcopy(cert.effort)}) == len(parts)
 
 

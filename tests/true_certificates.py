@@ -9,15 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from asked import certify_words
+from asked import certify_family, certify_words
 from generators import all_classes, random_graph, smallest
 from mutations import Json
 from side_files import with_factors, with_side_files
 
 from ptcc_certify.bounds import final_state as final_states
 from ptcc_certify.bounds.input.initial_set import box, ellipsoid
-from ptcc_certify.certificate import procedure
-from ptcc_certify.certificate.family_certificate import certify_family
+from ptcc_certify.certificate import graph_steps
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
@@ -50,7 +49,7 @@ def made(name: str, seed: int, slides: bool = False, large: bool = False, **opti
         start = None
     with pytest.MonkeyPatch.context() as patch:
         if large:
-            patch.setattr(procedure, "EXACT_NODES", 0)
+            patch.setattr(graph_steps, "EXACT_NODES", 0)
             patch.setattr(final_states, "EXACT_NODES", 0)
         certificate = certify_words(graph, protocol, start, simulation=False, **options)
         return {**json.loads(certificate.to_json()), "unverified": {}}

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_down, float_up
-from ptcc_certify.certificate.family_content import FamilyContent
+from ptcc_certify.certificate.family_proof import FamilyProof
+from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.certificate.restricted_states import ends_for_signal
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.graphs.tables import import_pandas
@@ -17,11 +18,11 @@ from ptcc_certify.graphs.tables import import_pandas
 if TYPE_CHECKING:
     import pandas as pd
 
-    from ptcc_certify.certificate.certificate_data import Content
+    from ptcc_certify.certificate.certificate_file import Recorded
 
 
-def agents_table(certificate: Content | FamilyContent, certified: bool = True) -> pd.DataFrame:
-    """Return one row per agent; see :meth:`Certificate.to_pandas` and :meth:`FamilyCertificate.to_pandas`.
+def agents_table(certificate: Recorded) -> pd.DataFrame:
+    """Return one row per agent; see :meth:`Certificate.to_pandas`.
 
     Examples
     --------
@@ -32,22 +33,23 @@ def agents_table(certificate: Content | FamilyContent, certified: bool = True) -
     """
     pandas = import_pandas()
     columns: Mapping[Any, Any]
-    if isinstance(certificate, FamilyContent):
-        columns = _of_family(certificate, certified)
+    proof = certificate.proof
+    if isinstance(proof, FamilyProof):
+        columns = _of_family(proof, certificate.verdict == "certified")
     else:
-        own = _of_graph(certificate) if certificate.agents is None else certificate.agents.columns()
-        columns = {**certificate.structure.to_pandas(), **own}
-    return pandas.DataFrame(columns, index=pandas.Index(certificate.labels, name="node"))
+        own = _of_graph(proof) if proof.agents is None else proof.agents.columns()
+        columns = {**proof.structure.to_pandas(), **own}
+    return pandas.DataFrame(columns, index=pandas.Index(proof.labels, name="node"))
 
 
-def _of_graph(certificate: Content) -> dict[str, Any]:
+def _of_graph(proof: GraphProof) -> dict[str, Any]:
     """Return where agents begin and end, and how near they are proved to be, NaN where that is not known."""
-    unknown = np.full(certificate.graph.n_nodes, np.nan)
-    begin, end = certificate.initial_positions, certificate.final_positions
+    unknown = np.full(proof.graph.n_nodes, np.nan)
+    begin, end = proof.initial_positions, proof.final_positions
     deviation = unknown
-    if begin is not None and certificate.functions:
-        share = 1 if certificate.direct else float(certificate.protocol.span / certificate.protocol.T)
-        deviation = certificate.deviation_bound([0.01 * share])[:, 0]
+    if begin is not None and proof.functions:
+        share = 1 if proof.direct else float(proof.protocol.span / proof.protocol.T)
+        deviation = proof.deviation_bound([0.01 * share])[:, 0]
     return {
         "x(0)": unknown if begin is None else [float(x) for x in begin],
         "x(T)": unknown if end is None else np.asarray(end, dtype=float),
@@ -55,18 +57,18 @@ def _of_graph(certificate: Content) -> dict[str, Any]:
     }
 
 
-def _of_family(certificate: FamilyContent, certified: bool) -> dict[str, Any]:
+def _of_family(proof: FamilyProof, certified: bool) -> dict[str, Any]:
     """Return intervals; nothing of restricted signals, nor of boxes, unless the check accepts the certificate."""
-    unknown: list[Interval | None] = [None] * certificate.family.n_nodes
-    restricted = ends_for_signal(certificate) if certified else unknown
-    signal = "" if certificate.signal == "any" else str(certificate.signal)
+    unknown: list[Interval | None] = [None] * proof.family.n_nodes
+    restricted = ends_for_signal(proof) if certified else unknown
+    signal = "" if proof.signal == "any" else str(proof.signal)
     return {
-        **_pair("least", "largest", certificate.final_states or unknown),
+        **_pair("least", "largest", proof.final_state or unknown),
         **_pair("restricted_least", "restricted_largest", restricted),
         "restricted_to": ["" if ends is None else signal for ends in restricted],
-        **_pair("box_least", "box_largest", _boxes(certificate) if certified else unknown),
-        **_pair("stays_least", "stays_largest", _ranges(certificate) if certified else unknown),
-        "keeps": _keeps(certificate),
+        **_pair("box_least", "box_largest", _boxes(proof) if certified else unknown),
+        **_pair("stays_least", "stays_largest", _ranges(proof) if certified else unknown),
+        "keeps": _keeps(proof),
     }
 
 
@@ -78,28 +80,28 @@ def _pair(least: str, largest: str, states: Iterable[Interval | None]) -> dict[s
     return {least: low, largest: high}
 
 
-def _boxes(certificate: FamilyContent) -> list[Interval | None]:
+def _boxes(proof: FamilyProof) -> list[Interval | None]:
     """Return the interval of the box of every agent that is in one."""
-    result: list[Interval | None] = [None] * certificate.family.n_nodes
-    for number, box in certificate.boxes.items():
-        nodes = certificate.parts[number].component.nodes[box.decay.nodes].tolist()
+    result: list[Interval | None] = [None] * proof.family.n_nodes
+    for number, box in proof.boxes.items():
+        nodes = proof.parts[number].component.nodes[box.decay.nodes].tolist()
         for v, low, high in zip(nodes, box.lower, box.upper, strict=True):
             result[v] = low, high
     return result
 
 
-def _ranges(certificate: FamilyContent) -> list[Interval | None]:
+def _ranges(proof: FamilyProof) -> list[Interval | None]:
     """Return the interval in which every signal keeps an agent whose end depends on it."""
-    result: list[Interval | None] = [None] * certificate.family.n_nodes
-    for number, ends in certificate.ranges.items():
-        for v, own in zip(certificate.parts[number].component.nodes.tolist(), ends, strict=True):
+    result: list[Interval | None] = [None] * proof.family.n_nodes
+    for number, ends in proof.ranges.items():
+        for v, own in zip(proof.parts[number].component.nodes.tolist(), ends, strict=True):
             result[v] = own
     return result
 
 
-def _keeps(certificate: FamilyContent) -> np.ndarray:
+def _keeps(proof: FamilyProof) -> np.ndarray:
     """Tell which agents no edge of any mode leads to, while no sliding variable moves, nor leaders."""
-    _, target, _ = certificate.family.union
-    hears = np.zeros(certificate.family.n_nodes, dtype=bool)
+    _, target, _ = proof.family.union
+    hears = np.zeros(proof.family.n_nodes, dtype=bool)
     hears[target] = True
-    return ~hears & (certificate.direct and not certificate.leaders_move)
+    return ~hears & (proof.direct and not proof.leaders_move)

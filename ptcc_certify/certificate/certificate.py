@@ -6,8 +6,6 @@ import hashlib
 import json
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
 from io import BytesIO
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,12 +13,13 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 from lmi.exact.decimal_rounding import down
 from ptcc_certify.certificate.agents_table import agents_table
-from ptcc_certify.certificate.certificate_data import Content, Source
 from ptcc_certify.certificate.certificate_file import Recorded, RejectedCertificate, bytes_of, text_of
 from ptcc_certify.certificate.checking import read_and_check, refuse_no_certificate
-from ptcc_certify.certificate.document import certificate_document, read_document
+from ptcc_certify.certificate.family_proof import FamilyProof
+from ptcc_certify.certificate.proof import Source
+from ptcc_certify.certificate.read_document import read_document
 from ptcc_certify.certificate.section_writer import read_side_files
-from ptcc_certify.checker import CheckReport, VerifiedObligation
+from ptcc_certify.checker import CheckReport
 from ptcc_certify.errors import FormatError, gated
 from ptcc_certify.graphs.io.files import refuse_no_path
 from ptcc_certify.graphs.kinds_of_file import refuse_as_certificate
@@ -29,57 +28,25 @@ from ptcc_certify.graphs.rationals import shorten
 if TYPE_CHECKING:
     import pandas as pd
 
-    from ptcc_certify.certificate.family_certificate import FamilyCertificate
-
 
 @gated
-@dataclass(frozen=True, eq=False, repr=False)
-class Certificate(Content, Recorded):
-    """A claim about a signed digraph under a protocol, with its proof.
+class Certificate(Recorded):
+    """A claim about a signed digraph, or a family of these, under a protocol, with its proof.
 
-    Made by :func:`ptcc_certify.certify`, or read from a file by :func:`read_certificate`.
+    Made by :func:`ptcc_certify.certify`, or read from a file by :func:`read_certificate`. What its parts tell is asked
+    of it by the same names: ``cert.rate`` is ``cert.proof.rate``, ``cert.limits`` is ``cert.question.request.limits``.
 
     Attributes
     ----------
-    structure : Structure
-    protocol : NominalProtocol or SlidingModeProtocol
-    initial_state : tuple of N Fraction, or None
-        ``X(0)``.
-    sigma0 : tuple of N Fraction, or None
-        ``sigma(0)`` of the sliding-mode protocol; None for the nominal one.
-    reaching : tuple of N ReachingTime, or None
-        When each sliding variable is proved to be 0, whatever the disturbance.
-    lyapunov : LyapunovFunction or None
-        The paper's; None when the search found none or was not started. All that are proved are ``functions``.
-    proof : RateProof
-        The proved rate of the paper's function (None if not proved) and the statements proved for it.
-    searched_functions : tuple of LyapunovFunction
-        Better ones, of the classes that ``method`` names, proved.
-    limit : RateBound or None
-        The proved upper bound on the decay rate, and what proves it; None if no agent listens to another.
-    final_state : FinalState or None
-        ``Q X(0)``, for the sliding-mode protocol ``Q (X(0) - sigma(0))``; None without an initial state.
-    matrix : Influence or None
-        ``Q``, as it was computed; see ``influence``.
-    request : Request
-        What was asked.
+    proof : GraphProof or FamilyProof
+        What is proved, with the question that it answers: :mod:`ptcc_certify.certificate.graph_proof` of one graph,
+        :mod:`ptcc_certify.certificate.family_proof` of a family whatever the signal.
     observed : Observations
         What was seen, and is not claimed.
-    late : LateBounds or None
-        What holds with late messages; None where nothing was asked of them.
-    tracking : Tracking or None
-        What holds while leaders move; None where nothing was asked of that.
-    source : Source or None
-        The file that it was read from.
-    agents : AgentsAnswer or None
-        What is proved of agents of order n; then initial and final states are there, and not above.
-    offsets : tuple of N Fraction, or None
-        Places of single integrators in a formation: initial and final state and everything else are of ``x - offsets``;
-        :attr:`initial_positions` and :attr:`final_positions` are of ``x``.
 
     References
     ----------
-    Theorems 1 to 6 and Corollaries 1 to 10 of [Zhu]_.
+    Theorems 1 to 6 and Corollaries 1 to 10 of [Zhu]_; docs/theory/families.md.
 
     Examples
     --------
@@ -89,28 +56,43 @@ class Certificate(Content, Recorded):
     ('certified', 'bipartite consensus', '1.1')
     >>> cert.final_state, bool(cert.rate <= cert.upper_bound), cert.checked.accepted
     (FinalState(1=1, 2=-1), True, True)
+    >>> day = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)])
+    >>> night = SignedDigraph.from_edges([("c", "a", -2), ("a", "b", 1)])
+    >>> certify({"day": day, "night": night}, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2, 3])
+    Certificate(bipartite consensus for every signal, rate 0.955184, certified)
     """
 
-    def _record(self, files: bool) -> tuple[dict[str, Any], Mapping[str, bytes], CheckReport]:
-        return certificate_document(self, files)
-
-    @cached_property
-    def checked(self) -> CheckReport:
-        """What the independent check says of the certificate as it is written, certified or undecided."""
-        return self._recorded[2]
-
     @property
-    def obligations(self) -> tuple[VerifiedObligation, ...]:
-        """What the independent check verified, in its order."""
-        return self.checked.obligations
+    def refused(self) -> bool:
+        """Whether the check does not accept functions that were found of a family: what follows of them is not told."""
+        parts = self.proof.parts if isinstance(self.proof, FamilyProof) else ()
+        return self.verdict != "certified" and any(part.functions for part in parts)
 
     def to_pandas(self) -> pd.DataFrame:
-        """Return one row per agent: its place in the graph, where it begins and ends, how near its end it is proved.
+        """Return one row per agent: where it begins and ends, and how near its end it is proved.
 
-        ``role``, ``group``, ``camp`` and ``component`` are those of :meth:`Structure.to_pandas`; ``x(0)`` and ``x(T)``
-        are rounded to floats; ``deviation`` bounds ``|x_k - x_k(T)|`` at 0.99 T, or at T_r + 0.99 T_s. The last three
-        are NaN where the certificate has no initial state, or nothing is proved. Of agents of order n there are columns
-        for each derivative and coordinate, such as ``v_2(T)``, and the proved bound of the input.
+        Of one graph ``role``, ``group``, ``camp`` and ``component`` are those of :meth:`Structure.to_pandas`; ``x(0)``
+        and ``x(T)`` are rounded to floats; ``deviation`` bounds ``|x_k - x_k(T)|`` at 0.99 T, or at T_r + 0.99 T_s. The
+        last three are NaN where the certificate has no initial state, or nothing is proved. Of agents of order n there
+        are columns for each derivative and coordinate, such as ``v_2(T)``, and the proved bound of the input.
+
+        Of a family ends are rounded outwards to floats, and NaN where nothing is proved; they are those with nothing
+        late and leaders at rest, also where more was asked.
+
+        - ``least``, ``largest``: of the state at the deadline, for every signal.
+        - ``restricted_least``, ``restricted_largest``: the same for the signals that were asked for, if not all were;
+          ``restricted_to`` names these, ``"constant"`` or ``"DwellTime(1/5, clock='t')"`` say, and is empty where there
+          are no such ends. Where the last mode decides, an agent stays between them at all times, whether or not it
+          comes to rest.
+        - ``box_least``, ``box_largest``: the interval into which every signal draws a follower whose end depends on the
+          signal. It may move there for ever: these are no ends at the deadline.
+        - ``stays_least``, ``stays_largest``: the interval in which every signal keeps an agent at all times whose end
+          depends on the signal.
+        - ``keeps``: whether no edge of any mode leads to the agent and neither sliding variables nor leaders move, so
+          that it stays at ``x(0)`` under every signal. Edges alone decide this, and it is no part of the claim that is
+          checked.
+
+        Without an initial state ``keeps`` alone is known, of an undecided certificate no restricted ends and no boxes.
 
         Raises
         ------
@@ -122,29 +104,21 @@ class Certificate(Content, Recorded):
         >>> pair = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
         >>> certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5]).to_pandas()["x(T)"].to_dict()
         {'a': -1.0, 'b': 1.0}
+        >>> pair = Family.from_intervals([("a", "b", -2, -1)])
+        >>> table = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2]).to_pandas()
+        >>> table.loc["b", ["least", "largest"]].tolist(), table["keeps"].tolist()
+        ([-1.0, -1.0], [True, False])
         """
         return agents_table(self)
 
-    @property
-    def main_figure(self) -> str:
-        """The figure of what is claimed: of moving leaders, late messages, agents of order n, else the decay."""
-        if self.agents is not None:
-            return "motion"
-        if self.initial_state is None or self.final_state is None:
-            return "decay"
-        return "tracking" if self.tracking is not None else "decay" if self.late is None else "late"
-
     def __repr__(self) -> str:
-        rate = "none" if self.rate is None else down(self.rate)
-        behaviour = f"{len(self.structure.components)} components"
-        if self.claim:
-            behaviour = self.claim.sharpest
-        return f"Certificate({behaviour}, {self.theorems_named}, rate {rate}, {self.verdict})"
+        rate = "none" if self.proof.rate is None else down(self.proof.rate)
+        return f"Certificate({self.proof.headline}, rate {rate}, {self.verdict})"
 
 
 def read_certificate(
-    path: str | Path | Mapping[str, Any] | Certificate | FamilyCertificate, *, stdlib: bool = False, memory: float = 1
-) -> Certificate | FamilyCertificate:
+    path: str | Path | Mapping[str, Any] | Certificate, *, stdlib: bool = False, memory: float = 1
+) -> Certificate:
     """Check a certificate's file with the independent check, and read it back.
 
     Nothing is taken from a file that the check does not accept, and no claim from its key ``unverified``. Bounds are
@@ -152,7 +126,7 @@ def read_certificate(
 
     Parameters
     ----------
-    path : str, Path, mapping, Certificate or FamilyCertificate
+    path : str, Path, mapping or Certificate
         A file of schema ``ptcc-certificate/2``; its side files are in the same folder. ``"-"`` is standard input, with
         side files in the current folder. Or its parsed JSON, without side files; or a certificate, which is written
         down and read back.
@@ -163,7 +137,7 @@ def read_certificate(
 
     Returns
     -------
-    Certificate or FamilyCertificate
+    Certificate
         Its verdict is ``certified`` or ``undecided``.
 
     Raises
@@ -215,7 +189,7 @@ def read_certificate(
 
 def _accepted(
     path: Path, document: dict[str, Any], report: CheckReport, sha256: str, name: str | None = None
-) -> Certificate | FamilyCertificate:
+) -> Certificate:
     """Return the certificate of a file, with the side files in its folder, or refuse what the check rejects."""
     if not report.accepted:
         raise RejectedCertificate(Path(name or path), report)
@@ -249,13 +223,9 @@ def _read_standard_input(stdlib: bool, memory: float) -> tuple[dict[str, Any], C
 
 def accepted_certificate(
     path: Path, document: Mapping[str, Any], sha256: str, report: CheckReport, files: Mapping[str, bytes]
-) -> Certificate | FamilyCertificate:
+) -> Certificate:
     """Return the certificate, of a graph or a family, whose file the independent check accepts."""
-    if "modes" in document["graph"]:
-        from ptcc_certify.certificate.read_family_certificate import read_family_certificate
-
-        return read_family_certificate(Source(path, sha256, document, report, None, files))
-    return Certificate(**read_document(path, document, sha256, report, files))
+    return Certificate(*read_document(Source(path, sha256, document, report, None, files)))
 
 
 def _file_hash(path: Path) -> str:

@@ -10,15 +10,17 @@ from pathlib import Path
 from typing import Any
 
 from ptcc_certify.certificate.answer import Assessment, rejection, rejects, verdict_of
-from ptcc_certify.certificate.certificate_data import Source
+from ptcc_certify.certificate.document import certificate_document
+from ptcc_certify.certificate.evidence import Evidence
 from ptcc_certify.certificate.facts import Fact
+from ptcc_certify.certificate.proof import Source
 from ptcc_certify.certificate.verdict import assess
-from ptcc_certify.checker import CheckReport
+from ptcc_certify.checker import CheckReport, VerifiedObligation
 from ptcc_certify.errors import ParameterError, PTCCError, gated
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.io.files import refuse_no_path
 from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.shown import Shown, rendered
+from ptcc_certify.shown import rendered
 
 
 class RejectedCertificate(PTCCError, ValueError):
@@ -52,24 +54,13 @@ class RejectedCertificate(PTCCError, ValueError):
         super().__init__(f"{shorten(str(path), 200)}: {reason}; {mend}")
 
 
-class Recorded(Shown):
-    """What certificates of graphs and of families have in common: JSON and file, check and verdict, what is told."""
-
-    source: Source | None
-
-    def _record(self, files: bool) -> tuple[dict[str, Any], Mapping[str, bytes], CheckReport]:
-        """Return the JSON, its side files by name, and what the check says, which lays down the proof."""
-        raise NotImplementedError
+class Recorded(Evidence):
+    """A certificate as it is recorded: JSON and file, check and verdict, what is told."""
 
     @property
-    def main_figure(self) -> str:
-        """The figure that is drawn where none is named."""
-        raise NotImplementedError
-
-    @property
-    def checkable(self) -> bool:
-        """Whether there is something to check."""
-        return True
+    def source(self) -> Source | None:
+        """The file that it was read from."""
+        return self.proof.source
 
     # ------------------------------------------------------------------ the JSON, and the check
 
@@ -77,7 +68,7 @@ class Recorded(Shown):
     def _recorded(self) -> tuple[Mapping[str, Any], Mapping[str, bytes], CheckReport]:
         if self.source is not None:
             return self.source.document, self.source.files, self.source.report
-        return self._record(files=True)
+        return certificate_document(self)
 
     def for_check(self) -> tuple[Mapping[str, Any], Mapping[str, bytes]]:
         """Return the JSON and the contents of its side files, as the independent check takes them."""
@@ -86,7 +77,12 @@ class Recorded(Shown):
     @cached_property
     def checked(self) -> CheckReport | None:
         """What the independent check says; None where there is nothing to check."""
-        return self._recorded[2] if self.checkable else None
+        return self._recorded[2] if self.proof.checkable else None
+
+    @property
+    def obligations(self) -> tuple[VerifiedObligation, ...]:
+        """What the independent check verified, in its order."""
+        return () if self.checked is None else self.checked.obligations
 
     @property
     def verdict(self) -> str:
@@ -96,7 +92,7 @@ class Recorded(Shown):
     @cached_property
     def assessment(self) -> Assessment:
         """The graded verdict: whether the bound says something by the deadline, what became of expectations."""
-        return assess(self, self.checked)  # type: ignore[arg-type]
+        return assess(self, self.checked)
 
     @property
     def document(self) -> Mapping[str, Any]:
@@ -107,10 +103,10 @@ class Recorded(Shown):
         document, files, report = self._recorded
         if self.source is not None:
             return document
-        if self.checkable and rejects(report):
+        if self.proof.checkable and rejects(report):
             return rejection(report)
         if files:
-            document = self._record(files=False)[0]
+            document = certificate_document(self, files=False)[0]
         return {**document, "verdict": self.verdict}
 
     def to_dict(self) -> dict[str, Any]:
@@ -207,7 +203,7 @@ class Recorded(Shown):
             ``"decay"``, ``"input"``, ``"graph"``, ``"states"``: runs and bounds, inputs and their proved peaks, graphs,
             states; ``"late"`` and ``"tracking"``: what is proved with late messages, or while leaders move. Of one
             graph also ``"spectrum"``, the eigenvalues; of agents of order n ``"motion"`` and ``"formation"``. None:
-            :attr:`main_figure`.
+            ``main_figure``.
         **keywords : Any
             ``ax`` and others of the function ``ptcc_certify.plot_<what>``.
 
@@ -220,7 +216,7 @@ class Recorded(Shown):
         ParameterError
             No figure is called so, or there is nothing to draw.
         """
-        return rendered("figures.plot", self, what or self.main_figure, **keywords)
+        return rendered("figures.plot", self, what or self.proof.main_figure, **keywords)
 
     # ------------------------------------------------------------------ equality
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from ptcc_certify.bounds.envelope import FLOOR_FACTOR
 from ptcc_certify.bounds.reaching_phase import ReachingPhase
-from ptcc_certify.certificate.family_certificate import FamilyCertificate
-from ptcc_certify.certificate.family_content import BoundFunction
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.family_proof import BoundFunction
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.lyapunov.family_function import FamilyFunction
@@ -34,8 +34,8 @@ class FamilyComparison:
     Attributes
     ----------
     deviation_ratio : float or None
-        ``max |x_k(t) - x_k(T)|`` over :meth:`FamilyCertificate.deviation_bound
-        <ptcc_certify.certificate.family_certificate.FamilyCertificate.deviation_bound>`; None if the run has no state
+        ``max |x_k(t) - x_k(T)|`` over :meth:`FamilyProof.deviation_bound
+        <ptcc_certify.certificate.family_proof.FamilyProof.deviation_bound>`; None if the run has no state
         at ``T`` that has settled.
     final_ratio : float or None
         The distance of ``x_k(T)`` from the middle of its interval, over half the length.
@@ -77,12 +77,12 @@ class FamilyComparison:
         return self.worst_ratio > VIOLATION
 
 
-def compare(certificate: FamilyCertificate, run: Trajectory) -> FamilyComparison:
+def compare(certificate: Certificate, run: Trajectory) -> FamilyComparison:
     """Compare a run with the bounds for every signal.
 
     Parameters
     ----------
-    certificate : FamilyCertificate
+    certificate : Certificate
         With an initial state.
     run : Trajectory
         Of the same family, protocol and initial state.
@@ -99,9 +99,8 @@ def compare(certificate: FamilyCertificate, run: Trajectory) -> FamilyComparison
     Examples
     --------
     >>> from ptcc_certify.graphs.family import Family
-    >>> from ptcc_certify.certificate.family_certificate import certify_family
     >>> unsure = Family.from_intervals([("a", "b", "0.8", "1.2"), ("b", "a", "-1.2", "-0.8")])
-    >>> cert = certify_family(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2])
+    >>> cert = certify(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2])
     >>> seen = [compare(cert, simulate(unsure, cert.protocol, [1, 2], s)) for s in worst_case_signals(cert)]
     >>> any(one.violated for one in seen), 0.9 < max(one.lyapunov_ratio for one in seen) < 1.000001
     (False, True)
@@ -133,12 +132,12 @@ def compare(certificate: FamilyCertificate, run: Trajectory) -> FamilyComparison
     )
 
 
-def worst_case_signals(certificate: FamilyCertificate, step: float | None = None) -> list[WorstCaseSignal]:
+def worst_case_signals(certificate: Certificate, step: float | None = None) -> list[WorstCaseSignal]:
     """Return the searches for worst cases: against every quadratic Lyapunov function, and against the largest state.
 
     Parameters
     ----------
-    certificate : FamilyCertificate
+    certificate : Certificate
     step : float, optional
         On the clock, as for :class:`~ptcc_certify.simulation.signals.WorstCaseSignal`.
     """
@@ -147,7 +146,7 @@ def worst_case_signals(certificate: FamilyCertificate, step: float | None = None
     return [*against, WorstCaseSignal(step=step)]
 
 
-def functions_of(certificate: FamilyCertificate) -> Iterator[tuple[np.ndarray, Quotient, FamilyFunction]]:
+def functions_of(certificate: Certificate) -> Iterator[tuple[np.ndarray, Quotient, FamilyFunction]]:
     """Yield every quadratic Lyapunov function with the nodes of its component and the coordinates it is in."""
     for part in certificate.parts:
         quadratic = [V for V in part.functions if isinstance(V, FamilyFunction)]
@@ -157,7 +156,7 @@ def functions_of(certificate: FamilyCertificate) -> Iterator[tuple[np.ndarray, Q
             yield part.component.nodes, quotient, V
 
 
-def _require_same(certificate: FamilyCertificate, run: Trajectory) -> None:
+def _require_same(certificate: Certificate, run: Trajectory) -> None:
     if not isinstance(run, Trajectory) or run.played is None:
         raise ParameterError(f"{shorten(repr(run))} is no run of a family; give what simulate returned of one")
     if certificate.initial_state is None:
@@ -172,7 +171,7 @@ def _require_same(certificate: FamilyCertificate, run: Trajectory) -> None:
             raise ParameterError(f"the run is of another {name} than the certificate")
 
 
-def _same_protocol(certificate: FamilyCertificate, run: Trajectory) -> bool:
+def _same_protocol(certificate: Certificate, run: Trajectory) -> bool:
     if run.sliding is None or certificate.sigma0 is None:
         return run.sliding is None and certificate.sigma0 is None and run.protocol.gain == certificate.protocol.gain
     return run.protocol == certificate.protocol and _close(run.sliding.sigma0, certificate.sigma0)
@@ -190,8 +189,8 @@ def _worst(values: np.ndarray, bounds: np.ndarray) -> float | None:
         return float(np.where(values > 0, values / bounds, 0.0).max(initial=0.0))
 
 
-def _final_ratio(certificate: FamilyCertificate, run: Trajectory, floor: float) -> float | None:
-    ends = certificate.final_states
+def _final_ratio(certificate: Certificate, run: Trajectory, floor: float) -> float | None:
+    ends = certificate.final_state
     if run.deadline_index is None or not run.deadline_resolved or ends is None:
         return None
     known = [k for k, interval in enumerate(ends) if interval is not None]
@@ -202,7 +201,7 @@ def _final_ratio(certificate: FamilyCertificate, run: Trajectory, floor: float) 
     return _worst(away, (high - low) / 2)
 
 
-def _input_ratio(certificate: FamilyCertificate, run: Trajectory, floor: float) -> float | None:
+def _input_ratio(certificate: Certificate, run: Trajectory, floor: float) -> float | None:
     """Return the worst ratio of inputs, and of their nominal parts, to their peaks."""
     gain = run.protocol.gain.value_at_remaining(run.remaining)
     error, ratios = np.multiply.outer(2 * Members(certificate.family).in_weight * floor, gain), []
@@ -212,7 +211,7 @@ def _input_ratio(certificate: FamilyCertificate, run: Trajectory, floor: float) 
     return max((ratio for ratio in ratios if ratio is not None), default=None)
 
 
-def _sliding_ratio(certificate: FamilyCertificate, run: Trajectory) -> float | None:
+def _sliding_ratio(certificate: Certificate, run: Trajectory) -> float | None:
     """Return the worst ratio of sliding variables to ``psi |sigma_k(0)|``."""
     sliding = run.sliding
     reaching, protocol = certificate.reaching, certificate.protocol.reaching
@@ -226,7 +225,7 @@ def _sliding_ratio(certificate: FamilyCertificate, run: Trajectory) -> float | N
     return _worst(np.abs(sliding.sigma), np.multiply.outer(np.abs(sliding.sigma0), share))
 
 
-def _driven_ratios(certificate: FamilyCertificate, run: Trajectory, floor: float) -> Iterator[float]:
+def _driven_ratios(certificate: Certificate, run: Trajectory, floor: float) -> Iterator[float]:
     """Yield the worst ratio of ``sqrt(V(x - sigma))`` to its bound, of every quadratic function that decays."""
     assert run.sliding is not None
     before = np.isfinite(run.clock)

@@ -11,7 +11,7 @@ import numpy as np
 from ptcc_certify.bounds.enclosed_ends import agents_ends, influence_balls
 from ptcc_certify.bounds.final_state import FinalState, Influence, rounding_radius
 from ptcc_certify.bounds.section_numbers import numbers
-from ptcc_certify.certificate.certificate_data import Content
+from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.certificate.section_writer import LONG, Writer, exact_or_ball, interval_text
 from ptcc_certify.checker.final_state import FormationSection, InfluenceSection, LeftNullVector
 from ptcc_certify.checker.obligations import CheckReport
@@ -21,33 +21,33 @@ from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure
 
 
-def final_state_sections(content: Content, out: Writer) -> tuple[InfluenceSection | None, dict[str, Any] | None]:
+def final_state_sections(proof: GraphProof, out: Writer) -> tuple[InfluenceSection | None, dict[str, Any] | None]:
     """Return the influence of every leader, and the final state, exact or in balls; None if they are floating point."""
-    if content.influence.exact:
-        return _exact_final_state(content)
-    return (None, None) if content.influence.enclosure is None else _enclose_final_state(content, out)
+    if proof.influence.exact:
+        return _exact_final_state(proof)
+    return (None, None) if proof.influence.enclosure is None else _enclose_final_state(proof, out)
 
 
-def _exact_final_state(content: Content) -> tuple[InfluenceSection, dict[str, Any] | None]:
-    matrix, labels = content.influence, content.graph.labels
+def _exact_final_state(proof: GraphProof) -> tuple[InfluenceSection, dict[str, Any] | None]:
+    matrix, labels = proof.influence, proof.graph.labels
     left_null_vectors, containment_weights = influence_balls(matrix)
     ends: dict[str, Any] | None = None
-    if content.final_state is not None and content.initial_state is not None:
-        sigma0 = content.sigma0 or [Fraction(0)] * len(labels)
-        first = [x - s for x, s in zip(content.initial_state, sigma0, strict=True)]
+    if proof.final_state is not None and proof.initial_state is not None:
+        sigma0 = proof.sigma0 or [Fraction(0)] * len(labels)
+        first = [x - s for x, s in zip(proof.initial_state, sigma0, strict=True)]
         ends = dict(zip(labels, _exact_texts(matrix, first), strict=True))
     groups = zip(matrix.balanced, left_null_vectors, strict=True)
     section = InfluenceSection(
         components=[LeftNullVector(nodes=c.nodes, left_null_vector=null_vector) for c, null_vector in groups],
         containment_weights=containment_weights,
-        degenerate=None if ends is None else list(content.degenerate),
+        degenerate=None if ends is None else list(proof.degenerate),
     )
     return section, ends
 
 
-def _enclose_final_state(content: Content, out: Writer) -> tuple[InfluenceSection, dict[str, Any] | None]:
+def _enclose_final_state(proof: GraphProof, out: Writer) -> tuple[InfluenceSection, dict[str, Any] | None]:
     """Write the final state of a large graph: left null vectors of leader groups, and its intervals."""
-    labels, matrix, final_state = content.graph.labels, content.influence, content.final_state
+    labels, matrix, final_state = proof.graph.labels, proof.influence, proof.final_state
     assert matrix.enclosure is not None
     final: dict[str, Any] | None = None
     if final_state is not None and final_state.radius is not None:
@@ -73,17 +73,17 @@ def _enclose_final_state(content: Content, out: Writer) -> tuple[InfluenceSectio
 
 
 def formation_section(
-    content: Content, offsets: Sequence[Fraction], final: Mapping[str, Any] | None
+    proof: GraphProof, offsets: Sequence[Fraction], final: Mapping[str, Any] | None
 ) -> FormationSection:
     """Return the places of a formation, and where its agents begin and end; ``final`` is where they end less these."""
     ends = None
-    if final is not None and content.final_state is not None:
-        pairs: Sequence[Interval] = content.final_state.intervals or ()
+    if final is not None and proof.final_state is not None:
+        pairs: Sequence[Interval] = proof.final_state.intervals or ()
         if not beside(final.get("mid")):
             pairs = list(map(interval, final.values()))
         placed = [(x + h, r) for (x, r), h in zip(pairs, offsets, strict=True)]
         ends = Numbers([x for x, _ in placed]), Numbers([r for _, r in placed])
-    positions = numbers(content.initial_positions)
+    positions = numbers(proof.initial_positions)
     return FormationSection(offsets=Numbers(offsets), initial_state=positions, final_state=ends)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from lmi.exact.definite import SparseFactor
 from ptcc_certify.bounds.attracting_box import AttractingBox
-from ptcc_certify.certificate.certificate_data import Content
+from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.certificate.section_writer import Reader, Writer, write
 from ptcc_certify.checker import attracting_boxes
 from ptcc_certify.checker.attracting_boxes import KeptBox
@@ -205,14 +205,14 @@ def _read_rows(
     return FollowerFunction(family, kernel, followers, *vectors, tuple(parts), section.rate)
 
 
-def paper_section(content: Content) -> PaperSection | None:
+def paper_section(proof: GraphProof) -> PaperSection | None:
     """Return the row of the theorem: its Lyapunov function, whether a rate of it was proved or not."""
-    V, interval = content.lyapunov, content.proof.interval
+    V, interval = proof.lyapunov, proof.paper_proof.interval
     if V is None:
         return None
     coordinates: Any = V.coordinates
     return PaperSection(
-        theorem=content.theorem.number,
+        theorem=proof.theorem.number,
         objective=V.objective,
         coordinates=coordinates,
         blocks=list(map(_block, V.blocks)),
@@ -223,8 +223,8 @@ def paper_section(content: Content) -> PaperSection | None:
     )
 
 
-def _rates(content: Content) -> RatesSection:
-    rates = content.paper_rate, content.diagonal_rate, content.rate, content.upper_bound
+def _rates(proof: GraphProof) -> RatesSection:
+    rates = proof.paper_rate, proof.diagonal_rate, proof.rate, proof.upper_bound
     return RatesSection(**dict(zip(("paper", "diagonal", "proved", "upper_bound"), rates, strict=True)))
 
 
@@ -287,10 +287,10 @@ def _read_block(section: BlockSection, data: Reader, large: bool) -> LyapunovBlo
     return LyapunovBlock(section.name, nodes, tuple(map(exact, section.diagonal or ())), section.times_rho)
 
 
-def _overshoot(content: Content) -> OvershootSection | None:
-    if content.rate is None:
+def _overshoot(proof: GraphProof) -> OvershootSection | None:
+    if proof.rate is None:
         return None
-    V = content.fastest
+    V = proof.fastest
     return OvershootSection(value=V.overshoot, of=f"||{V.coordinates}||^2")
 
 

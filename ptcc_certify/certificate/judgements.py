@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from itertools import islice
+from typing import Any
 
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.bounds.missed_deadline import Missed
 from ptcc_certify.bounds.tracking import Tracking
 from ptcc_certify.certificate.answer import MET, OPEN, REFUTED, Answer
-from ptcc_certify.certificate.certificate_data import Content
-from ptcc_certify.certificate.family_content import FamilyContent
+from ptcc_certify.certificate.family_proof import FamilyProof
+from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.certificate.restricted_claims import LastModeClaim
 from ptcc_certify.certificate.restricted_reasons import reasons_for_none
 from ptcc_certify.errors import Change, Sentence, joined
@@ -27,32 +29,25 @@ from ptcc_certify.theorems.family_claims import component_holds, component_refut
 from ptcc_certify.theorems.last_mode import last_mode_shows
 
 
-def judge(certificate: Content) -> Iterator[Answer]:
-    """Tell what became of what was asked of the certificate of a graph."""
-    asked = certificate.expectations
+def judge(proof: GraphProof | FamilyProof) -> Iterator[Answer]:
+    """Tell what became of what was asked."""
+    asked = proof.expectations
+    judges: tuple[Callable[[Any, Any], Answer], ...] = (_judge_behaviour, judge_rate, judge_input)
+    if isinstance(proof, FamilyProof):
+        judges = (_judge_behaviour_of_signal, _judge_rate_of_signal, _judge_input_of_signal)
+    judge_behaviour_of, judge_rate_of, judge_input_of = judges
     if asked.behaviour is not None:
-        yield at_deadline(certificate, _judge_behaviour(certificate, asked.behaviour))
+        yield at_deadline(proof, judge_behaviour_of(proof, asked.behaviour))
     if asked.min_rate is not None:
-        yield judge_rate(certificate, asked.min_rate)
+        yield judge_rate_of(proof, asked.min_rate)
     if asked.max_input is not None:
-        yield judge_input(certificate, asked.max_input)
-    yield from judge_limits(certificate)
-    yield from judge_messages(certificate)
-
-
-def judge_family(certificate: FamilyContent) -> Iterator[Answer]:
-    """Tell what became of what was asked of the certificate of a family."""
-    asked, components = certificate.expectations, [part.component for part in certificate.parts]
-    if asked.behaviour is not None:
-        yield at_deadline(certificate, _judge_behaviour_of_signal(certificate, components, asked.behaviour))
-    if asked.min_rate is not None:
-        yield _judge_rate_of_signal(certificate, asked.min_rate)
-    if asked.max_input is not None:
-        yield _judge_input_of_signal(certificate, asked.max_input)
-    reasons = (reason for reason, leaves_open in reasons_for_none(certificate).values() if leaves_open)
-    if asked.behaviour is None and asked.min_rate is None and (reason := next(reasons, "")):
-        yield Answer(OPEN, "what these signals do", reason)
-    yield from judge_messages(certificate)
+        yield judge_input_of(proof, asked.max_input)
+    if not isinstance(proof, FamilyProof):
+        yield from judge_limits(proof)
+    elif asked.behaviour is None and asked.min_rate is None:
+        reasons = (reason for reason, leaves_open in reasons_for_none(proof).values() if leaves_open)
+        yield from (Answer(OPEN, "what these signals do", reason) for reason in islice(reasons, 1))
+    yield from judge_messages(proof)
 
 
 def _proved_or_bounded(what: str, rate: Fraction | None, bound: Fraction | None, least: Fraction) -> Answer:
@@ -74,12 +69,12 @@ def judge_behaviour(structure: Structure, expected: str) -> Answer:
     return Answer(REFUTED, expected, f"it is {claims[0].sharpest}" if len(claims) == 1 else "not in every component")
 
 
-def _judge_behaviour(certificate: Content, expected: str) -> Answer:
+def _judge_behaviour(proof: GraphProof, expected: str) -> Answer:
     """Tell the same of what the agents are, which may be of order n, and have places or a capped gain."""
-    answer, part = judge_behaviour(certificate.structure, expected), certificate.agents
-    if part is None and certificate.offsets is not None:
+    answer, part = judge_behaviour(proof.structure, expected), proof.agents
+    if part is None and proof.offsets is not None:
         what = f"{expected} of x - offsets"
-        if certificate.limits:
+        if proof.limits:
             return Answer(OPEN, what, "limits of the gain leave something at T")
         return replace(answer, what=what)
     if part is None:
@@ -90,31 +85,31 @@ def _judge_behaviour(certificate: Content, expected: str) -> Answer:
     return Answer(OPEN, what, "the capped gain leaves something at T" if part.functions else "no decay is proved")
 
 
-def judge_rate(certificate: Content, least: Fraction) -> Answer:
+def judge_rate(proof: GraphProof, least: Fraction) -> Answer:
     """Tell whether a rate of at least so much is proved, or excluded by the proved upper bound."""
     what = f"rate >= {near(least, 12)}"
-    rate, bound = certificate.rate, certificate.upper_bound
-    if (answer := judge_rate_beside(certificate, least, what)) is not None:
+    rate, bound = proof.rate, proof.upper_bound
+    if (answer := judge_rate_beside(proof, least, what)) is not None:
         return answer
-    if certificate.agents is not None:
-        rate, bound = certificate.agents.rate if certificate.agents.functions else None, None
-    if certificate.constant or (rate is not None and rate >= least):
+    if proof.agents is not None:
+        rate, bound = proof.agents.rate if proof.agents.functions else None, None
+    if proof.constant or (rate is not None and rate >= least):
         return Answer(MET, what)
-    if rate is None and certificate.agents is not None and certificate.agents.functions:
+    if rate is None and proof.agents is not None and proof.agents.functions:
         return Answer(OPEN, what, "deviations of the cascade fall by two laws, not by one rate")
     return _proved_or_bounded(what, rate, bound, least)
 
 
-def judge_input(certificate: Content, most: Fraction) -> Answer:
+def judge_input(proof: GraphProof, most: Fraction) -> Answer:
     """Tell whether every input is proved to stay within so much, under all that was asked for besides."""
-    effort, what = certificate.effort, f"|u_k| <= {near(most, 12)}"
-    if certificate.agents is not None:
-        return certificate.agents.judge_input(most)
-    if certificate.constant:
+    effort, what = proof.effort, f"|u_k| <= {near(most, 12)}"
+    if proof.agents is not None:
+        return proof.agents.judge_input(most)
+    if proof.constant:
         return Answer(MET, what)
-    if certificate.late is not None or certificate.tracking is not None or certificate.asked_leaders is not None:
-        return judge_input_beside(certificate, most, what, _first_input(certificate))
-    least, bound = input_range(certificate)
+    if proof.late is not None or proof.tracking is not None or proof.asked_leaders is not None:
+        return judge_input_beside(proof, most, what, _first_input(proof))
+    least, bound = input_range(proof)
     if bound is not None and bound <= most:
         return Answer(MET, what)
     if least > most:
@@ -124,12 +119,12 @@ def judge_input(certificate: Content, most: Fraction) -> Answer:
     solid = (
         effort is not None and effort.initial_set is not None and all(r > 0 for r in effort.initial_set.radius or (0,))
     )
-    if effort is not None and effort.bounded is False and solid and not certificate.limits:
+    if effort is not None and effort.bounded is False and solid and not proof.limits:
         return Answer(REFUTED, what, "from some of these initial states it grows without limit, proved")
     return Answer(OPEN, what, "no bound is proved" if bound is None else f"proved: {up(bound)}")
 
 
-def input_range(certificate: Content) -> tuple[Fraction | float, Fraction | None]:
+def input_range(proof: GraphProof) -> tuple[Fraction | float, Fraction | None]:
     """Return proved bounds of the largest ``|u_k|`` over all agents, initial states, noise and disturbances.
 
     Under the limits of the gain, with noise within ``noise`` and disturbances within ``delta``. The lower bound is
@@ -137,60 +132,60 @@ def input_range(certificate: Content) -> tuple[Fraction | float, Fraction | None
     The upper one is None where nothing is proved. What disturbances add under the protocol itself they add at most
     under a cap and a stop, too: ``gain int_0^t e^(-alpha (s(t) - s(r))) dr`` stays below what is proved without these.
     """
-    effort, p, graph = certificate.effort, certificate.protocol, certificate.structure.graph
+    effort, p, graph = proof.effort, proof.protocol, proof.structure.graph
     if effort is None:
         return Fraction(0), None
-    tops = [entry.largest_gain(p.gain.exact) for entry in certificate.limits]
+    tops = [entry.largest_gain(p.gain.exact) for entry in proof.limits]
     share = min([Fraction(1), *(top / p.gain.first for top in tops)])
     least: Fraction | float = (effort.first or Fraction(0)) * share
-    if certificate.noise is not None:
+    if proof.noise is not None:
         rows = graph.exact_rows(range(graph.n_nodes))
         degree = max(row.get(v, Fraction(0)) for v, row in enumerate(rows))
-        least = max(least, 2 * degree * certificate.noise * min(tops)) if tops else math.inf
-    if certificate.limits:
-        peaks = [e.largest if certificate.noise is None else e.noisy_largest for e in effort.residual]
-        most = None if len(peaks) < len(certificate.limits) or None in peaks else max(x for x in peaks if x is not None)
+        least = max(least, 2 * degree * proof.noise * min(tops)) if tops else math.inf
+    if proof.limits:
+        peaks = [e.largest if proof.noise is None else e.noisy_largest for e in effort.residual]
+        most = None if len(peaks) < len(proof.limits) or None in peaks else max(x for x in peaks if x is not None)
     else:
-        most = None if effort.peak is None or certificate.noise is not None else effort.peak.largest
-    if most is not None and certificate.delta is not None:
+        most = None if effort.peak is None or proof.noise is not None else effort.peak.largest
+    if most is not None and proof.delta is not None:
         most = None if effort.disturbed is None else most + max(effort.disturbed.inputs)
     return least, most
 
 
-def _first_input(certificate: Content) -> Fraction:
+def _first_input(proof: GraphProof) -> Fraction:
     """Return what the largest ``|u_k(0)|`` is at least under the limits of the gain; 0 where nothing is known."""
-    first = None if certificate.effort is None else certificate.effort.first
-    return Fraction(0) if first is None else first * _first_share(certificate)
+    first = None if proof.effort is None else proof.effort.first
+    return Fraction(0) if first is None else first * _first_share(proof)
 
 
-def _first_share(certificate: Content | FamilyContent) -> Fraction:
+def _first_share(proof: GraphProof | FamilyProof) -> Fraction:
     """Return what the limits of the gain leave of the first gain."""
-    gain, late, limits = certificate.protocol.gain, certificate.late, certificate.limits
+    gain, late, limits = proof.protocol.gain, proof.late, proof.limits
     caps = [] if late is None or late.messages.gain_cap is None else [late.messages.gain_cap]
     tops = [*caps, *(entry.largest_gain(gain.exact) for entry in limits)]
     return min([Fraction(1), *(top / gain.first for top in tops)])
 
 
-def judge_limits(certificate: Content) -> list[Answer]:
+def judge_limits(proof: GraphProof) -> list[Answer]:
     """Tell which of the limits, noise and disturbances that were asked for are not certified."""
-    effort, answers = certificate.effort, []
+    effort, answers = proof.effort, []
     residual = () if effort is None else effort.residual
-    mend: Sentence = "" if certificate.method == "best" else ("; try ", Change("method", "best"))
+    mend: Sentence = "" if proof.method == "best" else ("; try ", Change("method", "best"))
     no_bound = joined("", ("no bound of its effect is proved", mend))
-    if len(residual) < len(certificate.limits) and not certificate.constant:
+    if len(residual) < len(proof.limits) and not proof.constant:
         period = None if effort is None else effort.longest_period
         why = joined("", ("no bound of their effect is proved", mend))
         why = why if period is None else f"certified with a period of {down(period, 4)}"
         answers.append(Answer(OPEN, "limits", why))
-    silent = not residual or len(residual) < len(certificate.limits) or not all(entry.noise for entry in residual)
-    if certificate.noise is not None and silent and not certificate.constant:
+    silent = not residual or len(residual) < len(proof.limits) or not all(entry.noise for entry in residual)
+    if proof.noise is not None and silent and not proof.constant:
         why = ("without a limit it meets an infinite gain: add ", Change("gain_cap"), " or ", Change("stop_before"))
-        if any(entry.sample_period is not None for entry in certificate.limits):
+        if any(entry.sample_period is not None for entry in proof.limits):
             why = "with a sample period no bound is proved: ask for each alone"
-        elif certificate.limits:
+        elif proof.limits:
             why = no_bound
         answers.append(Answer(OPEN, "noise", why))
-    if certificate.delta is not None and (effort is None or effort.disturbed is None):
+    if proof.delta is not None and (effort is None or effort.disturbed is None):
         bounded = effort is not None and effort.bounded
         answers.append(Answer(OPEN, "delta", no_bound if bounded else "the rate proves no bounded input"))
     return answers
@@ -199,11 +194,11 @@ def judge_limits(certificate: Content) -> list[Answer]:
 # ---------------------------------------------------------------------- late messages, moving leaders
 
 
-def at_deadline(certificate: Content | FamilyContent, answer: Answer) -> Answer:
+def at_deadline(proof: GraphProof | FamilyProof, answer: Answer) -> Answer:
     """Return what becomes at ``T``, where messages are late, of a behaviour that follows where none are."""
-    late = certificate.late
-    asked = certificate.asked_messages is not None
-    if not asked or answer.status != MET or certificate.constant:
+    late = proof.late
+    asked = proof.asked_messages is not None
+    if not asked or answer.status != MET or proof.constant:
         return answer
     what = f"{answer.what} at T with late messages"
     if late is None:
@@ -221,19 +216,19 @@ def at_deadline(certificate: Content | FamilyContent, answer: Answer) -> Answer:
     return Answer(OPEN, what, "nobody is proved to settle at T")
 
 
-def judge_rate_beside(certificate: Content | FamilyContent, least: Fraction, what: str) -> Answer | None:
+def judge_rate_beside(proof: GraphProof | FamilyProof, least: Fraction, what: str) -> Answer | None:
     """Tell the same of a rate where messages are late, leaders move or the gain is held; None where nothing of it is.
 
-    The rates of a certificate, and the upper bound on them, are those of the loop without these.
+    The rates of a proof, and the upper bound on them, are those of the loop without these.
     """
-    late = certificate.late
-    if certificate.constant or certificate.agents is not None:
+    late = proof.late
+    if proof.constant or proof.agents is not None:
         return None
-    if certificate.leaders_move:
+    if proof.leaders_move:
         return Answer(OPEN, what, "no rate is proved while leaders move")
-    if any(limits.sample_period is not None for limits in certificate.limits):
+    if any(limits.sample_period is not None for limits in proof.limits):
         return Answer(OPEN, what, "no rate is proved of a gain that is held")
-    if certificate.asked_messages is None or (late is not None and late.direct):
+    if proof.asked_messages is None or (late is not None and late.direct):
         return None
     if late is None or late.lmi is None:
         return Answer(OPEN, what, "no rate is proved with late messages")
@@ -241,29 +236,29 @@ def judge_rate_beside(certificate: Content | FamilyContent, least: Fraction, wha
     return Answer(MET if rate >= least else OPEN, what, f"with late messages {down(rate)} is proved")
 
 
-def judge_messages(certificate: Content | FamilyContent) -> list[Answer]:
+def judge_messages(proof: GraphProof | FamilyProof) -> list[Answer]:
     """Tell what becomes of what may be left at ``T`` with late messages, and whether anything is proved of these."""
-    late, most = certificate.late, certificate.expectations.max_residual
+    late, most = proof.late, proof.expectations.max_residual
     if late is None:
-        unproved = certificate.asked_messages is not None
+        unproved = proof.asked_messages is not None
         answers = []
         if unproved:
             answers.append(Answer(OPEN, "late messages", "nothing is proved of what is left at T"))
         elif most is not None:
             answers.append(Answer(OPEN, "max_residual", "no messages are late"))
-        if certificate.asked_leaders is not None and certificate.tracking is None:
+        if proof.asked_leaders is not None and proof.tracking is None:
             answers.append(Answer(OPEN, "leaders that move", "no vector for their followers was found"))
         return answers
     if not late.says_something:
         limited = 0 < (late.longest_delay or 0) < math.inf
         limit = f"; this certificate's limit is a delay of {late.longest_delay:.3g}" if limited else ""
         wish = "" if most is None else _longest(late, f"within {near(most, 12)} at T is ")
-        mend = "; give an initial state" if certificate.initial_state is None else ""
+        mend = "; give an initial state" if proof.initial_state is None else ""
         return [Answer(OPEN, "late messages", f"nothing is proved of what is left at T{mend}{limit}{wish}")]
-    return [] if most is None else [_judge_residual(certificate, late, most)]
+    return [] if most is None else [_judge_residual(proof, late, most)]
 
 
-def _judge_residual(certificate: Content | FamilyContent, late: LateBounds, most: Fraction) -> Answer:
+def _judge_residual(proof: GraphProof | FamilyProof, late: LateBounds, most: Fraction) -> Answer:
     """Tell whether no more than ``most`` is left at ``T``, and up to which delay that is proved."""
     what = f"within {near(most, 12)} at T{' from within 1 of it' if late.relative else ''}"
     missed = late.missed
@@ -287,9 +282,7 @@ def _misses(late: LateBounds, missed: Missed) -> str:
     return f"agent {late.labels[missed.agent]} is away by {down(missed.bound, 2)} at least, proved"
 
 
-def judge_input_beside(
-    certificate: Content | FamilyContent, most: Fraction, what: str, first: Fraction | float
-) -> Answer:
+def judge_input_beside(proof: GraphProof | FamilyProof, most: Fraction, what: str, first: Fraction | float) -> Answer:
     """Tell whether every input stays within so much where messages are late, or leaders move.
 
     Parameters
@@ -301,18 +294,18 @@ def judge_input_beside(
     first : Fraction or float
         What the largest ``|u_k(0)|`` is at least where nobody hears of anything wrong.
     """
-    late, tracking = certificate.late, certificate.tracking
+    late, tracking = proof.late, proof.tracking
     other = late is not None and (late.messages.value_error or late.messages.vehicles is not None)
     if first > most and not other:
         return Answer(REFUTED, what, f"it is up to {down(first)} at the start, proved")
     if late is not None:
-        return _judge_late_input(certificate, late, most, what)
+        return _judge_late_input(proof, late, most, what)
     return _judge_tracking(tracking, most, what)
 
 
-def _judge_late_input(certificate: Content | FamilyContent, late: LateBounds, most: Fraction, what: str) -> Answer:
+def _judge_late_input(proof: GraphProof | FamilyProof, late: LateBounds, most: Fraction, what: str) -> Answer:
     """Tell whether every input stays within so much with late messages."""
-    largest = largest_late_input(late, certificate.protocol)
+    largest = largest_late_input(late, proof.protocol)
     if largest is None:
         why = "no bound is proved with late messages"
         if late.messages.vehicles is not None:
@@ -363,15 +356,13 @@ def judge_family_behaviour(components: Sequence[FamilyComponent], expected: str)
     return Answer(OPEN, expected, "not decided") if None in answers else Answer(MET, expected)
 
 
-def _judge_behaviour_of_signal(
-    certificate: FamilyContent, components: Sequence[FamilyComponent], expected: str
-) -> Answer:
+def _judge_behaviour_of_signal(proof: FamilyProof, expected: str) -> Answer:
     """Tell whether a behaviour holds for every signal, or for those that were asked for, by the last mode."""
-    last = certificate.ends_of_signal
+    last, components = proof.ends_of_signal, [part.component for part in proof.parts]
     others = [component for k, component in enumerate(components) if k not in last]
-    narrow = isinstance(certificate.signal, ClockShares | JointWindows)  # no constant member is one of these signals
+    narrow = isinstance(proof.signal, ClockShares | JointWindows)  # no constant member is one of these signals
     judged = [component for component in others if component.behaviour != DEPENDS or not narrow]
-    every = "" if certificate.signal == "any" else "every signal"
+    every = "" if proof.signal == "any" else "every signal"
     met = Answer(MET, expected, "these signals" if last else every)
     answer = judge_family_behaviour(judged, expected) if judged else met
     answer = met if answer.status == MET else answer
@@ -386,55 +377,55 @@ def _judge_behaviour_of_signal(
             number = shows.index(False)
             whose = "it is "
             if isinstance(claim, LastModeClaim):
-                whose = f"{mode_name(certificate.family, number)} by itself: "
+                whose = f"{mode_name(proof.family, number)} by itself: "
             return Answer(REFUTED, expected, f"{whose}{claim.behaviours[number]}")
         if None in shows and answer.status == MET:
             answer = Answer(OPEN, expected, "not decided of these signals")
     return answer
 
 
-def _judge_rate_of_signal(certificate: FamilyContent, least: Fraction) -> Answer:
+def _judge_rate_of_signal(proof: FamilyProof, least: Fraction) -> Answer:
     """Tell whether a rate of at least so much is proved for every signal, or excluded by the upper bound."""
     what = f"rate >= {near(least, 12)}"
-    rate, bound = certificate.rate_of_signal, certificate.upper_bound
-    if (answer := judge_rate_beside(certificate, least, what)) is not None:
+    rate, bound = proof.rate_of_signal, proof.upper_bound
+    if (answer := judge_rate_beside(proof, least, what)) is not None:
         return answer
-    if certificate.signal != "any":
+    if proof.signal != "any":
         # No constant member is one of these signals.
-        narrow = isinstance(certificate.signal, ClockShares | JointWindows)
-        bound = None if narrow else certificate.member_bound
-    alone = all(part.component.nodes.size == 1 for part in certificate.parts)
+        narrow = isinstance(proof.signal, ClockShares | JointWindows)
+        bound = None if narrow else proof.member_bound
+    alone = all(part.component.nodes.size == 1 for part in proof.parts)
     if alone or (rate is not None and rate >= least):
-        every = alone or (certificate.rate is not None and certificate.rate >= least)
-        return Answer(MET, what, "" if certificate.signal == "any" else "every signal" if every else "these signals")
-    if certificate.signal == "any" and any(part.component.behaviour == DEPENDS for part in certificate.parts):
+        every = alone or (proof.rate is not None and proof.rate >= least)
+        return Answer(MET, what, "" if proof.signal == "any" else "every signal" if every else "these signals")
+    if proof.signal == "any" and any(part.component.behaviour == DEPENDS for part in proof.parts):
         return Answer(REFUTED, what, "no rate holds for every signal")
-    if not certificate.common:
-        differ = any(part.component.behaviour == DEPENDS for part in certificate.parts)
+    if not proof.common:
+        differ = any(part.component.behaviour == DEPENDS for part in proof.parts)
         reason = "whether rest states agree is not decided"
         return Answer(OPEN, what, "no rate is proved of modes that end differently" if differ else reason)
     return _proved_or_bounded(what, rate, bound, least)
 
 
-def _judge_input_of_signal(certificate: FamilyContent, most: Fraction) -> Answer:
+def _judge_input_of_signal(proof: FamilyProof, most: Fraction) -> Answer:
     """Tell whether every input is proved to stay within so much for every signal."""
-    what, peaks = f"|u_k| <= {near(most, 12)}", certificate.input_peaks
-    has_first_input = certificate.initial_state is not None and certificate.protocol.reaching is None
-    if certificate.late is not None or certificate.leaders_move:
-        first = first_input(certificate) * _first_share(certificate) if has_first_input else Fraction(0)
-        return judge_input_beside(certificate, most, what, first)
+    what, peaks = f"|u_k| <= {near(most, 12)}", proof.input_peaks
+    has_first_input = proof.initial_state is not None and proof.protocol.reaching is None
+    if proof.late is not None or proof.leaders_move:
+        first = first_input(proof) * _first_share(proof) if has_first_input else Fraction(0)
+        return judge_input_beside(proof, most, what, first)
     if peaks is not None and max(peaks) <= most:
-        return Answer(MET, what, "" if certificate.signal == "any" else "every signal")
-    if has_first_input and (first := first_input(certificate)) > most:
+        return Answer(MET, what, "" if proof.signal == "any" else "every signal")
+    if has_first_input and (first := first_input(proof)) > most:
         return Answer(REFUTED, what, f"it is up to {down(first)} at the start, proved")
     return Answer(OPEN, what, "no bound is proved" if peaks is None else f"proved: {up(max(peaks))}")
 
 
-def first_input(certificate: FamilyContent) -> Fraction:
+def first_input(proof: FamilyProof) -> Fraction:
     """Return the largest ``|u_k(0)|`` over all signals and agents: that of some member."""
-    assert certificate.initial_state is not None
-    rows = (row for mode in certificate.family.modes for row in _first_rows(mode, certificate.initial_state).values())
-    return certificate.protocol.gain.first * max((max(abs(low), high) for low, high in rows), default=Fraction(0))
+    assert proof.initial_state is not None
+    rows = (row for mode in proof.family.modes for row in _first_rows(mode, proof.initial_state).values())
+    return proof.protocol.gain.first * max((max(abs(low), high) for low, high in rows), default=Fraction(0))
 
 
 def _first_rows(mode: Mode, x: Sequence[Fraction]) -> Mapping[int, tuple[Fraction, Fraction]]:

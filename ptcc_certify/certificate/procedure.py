@@ -7,50 +7,21 @@ the check; a simulation corroborates and never proves.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from fractions import Fraction
-from functools import partial
-from typing import Any, overload
+from dataclasses import replace
+from typing import Any
 
-import numpy as np
-
-from lmi import search_time as deadline
 from lmi.blas_threads import one_thread
-from lmi.child_process import apart
-from lmi.errors import LMIError, NoCertificate, OutOfTime
-from lmi.search_time import share_of_time
-from ptcc_certify.bounds.enclosed_ends import Interval
-from ptcc_certify.bounds.envelope import FRACTIONS
-from ptcc_certify.bounds.final_state import (
-    FinalState,
-    Influence,
-    NotEnclosedError,
-    enclose,
-    enclosed_final_state,
-    final_state,
-    influence,
-    influence_in_floats,
-    takes_long,
-)
-from ptcc_certify.bounds.late_messages import LateBounds, bound_late
-from ptcc_certify.bounds.longest_delay import LateCase
-from ptcc_certify.bounds.tracking import Tracking, bound_tracking
-from ptcc_certify.certificate.agents_part import AgentsPart, prove_agents, with_instants, with_phases
 from ptcc_certify.certificate.agents_request import (
-    Chains,
     formation_on_a_line,
     read_chains,
     with_vehicles,
 )
-from ptcc_certify.certificate.cascade_part import prove_cascade
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.certificate_data import Observations
-from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
-from ptcc_certify.certificate.final_state_sections import stated_ends
+from ptcc_certify.certificate.family_steps import certify_family, refuse_signals
+from ptcc_certify.certificate.graph_steps import STEPS, GraphSteps, with_agents, with_small_delays, with_word_of_check
 from ptcc_certify.certificate.request import (
-    Request,
+    Question,
     listener,
     origins_of,
     read_initial_state,
@@ -58,35 +29,22 @@ from ptcc_certify.certificate.request import (
     read_sliding_variable,
     refuse_long_weights,
 )
-from ptcc_certify.certificate.verdict import MANY_DECADES
 from ptcc_certify.checker.input_formulas import Limits
-from ptcc_certify.errors import Change, HypothesisError, ParameterError, SimulationError, gated
-from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import as_family, as_graph
 from ptcc_certify.graphs.io.conversion import is_family
 from ptcc_certify.graphs.size_limits import (
-    EXACT_NODES,
-    FACTOR_NODES,
     ONE_THREAD_NODES,
-    SEARCH_NODES,
-    SIMULATED_NODES,
 )
-from ptcc_certify.graphs.structure import Structure, analyse
-from ptcc_certify.lyapunov.error_system import ErrorSystem
+from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.lyapunov.follower_rows import refuse_other_targets
-from ptcc_certify.lyapunov.function import LyapunovFunction
-from ptcc_certify.lyapunov.rate_upper_bound import RateBound, mean_bound, prove_rate_bound
-from ptcc_certify.lyapunov.search import APART_NODES, Search, search_functions, search_large
 from ptcc_certify.model import Protocol
 from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.base import ReachingProtocol
 from ptcc_certify.model.case import Case
-from ptcc_certify.model.disturbance import as_disturbance
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
-from ptcc_certify.model.reaching_time import ReachingTime
 from ptcc_certify.model.refusals import (
     refuse_agents,
     refuse_before_the_graph,
@@ -95,39 +53,6 @@ from ptcc_certify.model.refusals import (
     refuse_of_families,
 )
 from ptcc_certify.model.restricted_signals import SignalClass
-from ptcc_certify.simulation.instants import PAST
-from ptcc_certify.simulation.run import simulate
-from ptcc_certify.simulation.sliding import rounding_slack
-from ptcc_certify.simulation.trajectory import Trajectory
-from ptcc_certify.theorems.lemmas import laplacian_spectrum
-from ptcc_certify.theorems.table import theorem_for
-from ptcc_certify.theorems.theorem import RateProof, Theorem
-
-#: What :func:`certify` does, in this order.
-STEPS = (
-    "simulation",
-    "the paper's certificate",
-    "other Lyapunov functions",
-    "upper bound on the decay rate",
-    "final state",
-    "independent check",
-)
-#: The share of a time limit that the final state may take; and of a limit of work, which it does not count: it ends by
-#: processor time, five times as long, and has twice of what it may take where nothing else is at work.
-ENDING, ENDING_WORK = 0.3, 0.12
-#: The share of a time limit after which the searches end, so that what they found is checked within it, and the shares
-#: of the time then left that the first of the steps may take.
-SEARCHING, SHARES = 0.4, (0.3, 0.3, 0.8, 1.0)
-#: Instants of a simulated run where the graph is large.
-FEW_SAMPLES = 51
-#: A simulated end state is settled when it is this near to the final state, relative to the initial state.
-SETTLED = 1e-6
-
-
-@overload
-def certify(graph: Family, protocol: Protocol, x0: Any = None, **parts: Any) -> FamilyCertificate: ...
-@overload
-def certify(graph: Any, protocol: Protocol, x0: Any = None, **parts: Any) -> Certificate: ...
 
 
 @gated  # type: ignore[misc]  # it takes the parts below, no others
@@ -143,7 +68,7 @@ def certify(
     leaders: MovingLeaders | None = None,
     limits: Limits | Sequence[Limits] = (),
     asks: Asks | None = None,
-) -> Certificate | FamilyCertificate:
+) -> Certificate:
     """Certify what a protocol does on a signed digraph, or on a family of these whatever the signal.
 
     Parameters
@@ -180,9 +105,8 @@ def certify(
 
     Returns
     -------
-    Certificate or FamilyCertificate
-        Of a family the latter: it takes ``x0``, ``signal`` (under the nominal protocol), and of ``asks`` time limit and
-        expectations.
+    Certificate
+        A family takes ``x0``, ``signal`` (under the nominal protocol), and of ``asks`` time limit and expectations.
 
     Raises
     ------
@@ -212,7 +136,7 @@ def certify(
     >>> cert.final_state
     FinalState(1=-1.5, 2=1.5)
     >>> certify(g, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), uncertainty="10%")
-    FamilyCertificate(bipartite consensus for every signal, rate 3.59999, certified)
+    Certificate(bipartite consensus for every signal, rate 3.59999, certified)
     """
     return certify_case(Case(graph, protocol, x0, uncertainty, signal, agents, messages, leaders, limits, asks))
 
@@ -223,14 +147,14 @@ def certify_case(
     progress: Callable[[str], None] | None = None,
     scenario: Mapping[str, Any] | None = None,
     origins: Mapping[str, str] | None = None,
-) -> Certificate | FamilyCertificate:
+) -> Certificate:
     """Certify a case, and keep where it comes from.
 
     Parameters
     ----------
     case : Case
     progress : callable, optional
-        Is told each of :data:`STEPS` as it begins.
+        Is told each step as it begins: ``STEPS`` of one graph, or of a family.
     scenario : mapping, optional
         The scenario file that asked for it, as JSON: kept in the certificate under ``unverified.scenario``.
     origins : mapping of str to str, optional
@@ -239,47 +163,60 @@ def certify_case(
 
     Returns
     -------
-    Certificate or FamilyCertificate
+    Certificate
     """
     origins = origins_of(case.graph, case.initial) | dict(origins or {})
     case = with_vehicles(case.with_plain_agents())
     _refuse_before_reading(case)
-    if case.uncertainty or is_family(case.graph):
-        return _certify_family(case, progress, scenario, origins)
-    if case.signal != "any":
-        raise ParameterError("signal is for families of graphs, which change; this is one graph: leave it out")
-    progress, graph = listener(progress), as_graph(case.graph)
+    progress, family = listener(progress), _read_family(case)
+    graph = as_graph(case.graph) if family is None else family.modes[0].mandatory
     refuse_before_the_graph(case)
-    refuse_long_weights(graph)
-    structure = analyse(graph)
-    protocol, agents = case.protocol, case.agents
+    if family is None:
+        refuse_long_weights(graph)
+    else:
+        refuse_signals(family, case)
+    structure, agents = analyse(graph), case.agents  # of a family for its nodes alone
     chains, formation = None, None
     if agents is not None:
-        chains = read_chains(agents, graph, protocol.gain, case.initial)
+        chains = read_chains(agents, graph, case.protocol.gain, case.initial)
         formation = formation_on_a_line(case, agents, chains)
     if formation is not None:
         case, chains = formation.case_of(case), None
     request = read_request(structure, case, scenario, origins)
     if formation is not None:
         request = replace(request, initial_set=formation.shift(request.initial_set))
-    refuse_beside(structure, case)
-    initial, disturbance = case.initial, case.asks.disturbance
-    state = None if initial.x0 is None or chains else read_initial_state(structure, initial.x0, "x0")
-    manifold, reaching = read_sliding_variable(structure, protocol, initial.sigma0)
-    search = CertificateSearch(structure, protocol, request, state, manifold, progress)
-    wanted = search.needs_run(case.asks.simulation)
-    runs = wanted and state is not None
-    if not runs and disturbance is not None and protocol.reaching is not None:
-        _check_disturbance(disturbance, protocol.reaching, graph)
+    if family is None:
+        refuse_beside(structure, case)
+    x0 = None if chains else case.initial.x0
+    state = None if x0 is None else read_initial_state(structure, x0, "x0")
+    manifold, reaching = read_sliding_variable(structure, case.protocol, case.initial.sigma0)
+    question = Question(structure if family is None else family, case.protocol, state, manifold, request)
     with one_thread(graph.n_nodes <= ONE_THREAD_NODES):
-        certificate = search.certificate(disturbance, runs, reaching)
+        if family is not None:
+            return certify_family(family, question, reaching, progress)
+        steps = GraphSteps(structure, question, progress)
+        wanted = steps.needs_run(case.asks.simulation)
+        certificate = steps.certificate(case.asks.disturbance, wanted and state is not None, reaching)
         if formation is not None:
             certificate = certificate.changed(offsets=formation.offsets)
         if agents is not None and chains is not None:
-            certificate = _with_agents(certificate, agents, chains, wanted)
-        certificate = _with_small_delays(certificate)
+            certificate = with_agents(certificate, agents, chains, wanted)
+        certificate = with_small_delays(certificate)
         progress(STEPS[5])
-        return _with_word_of_check(certificate)
+        return with_word_of_check(certificate)
+
+
+def _read_family(case: Case) -> Family | None:
+    """Return the family that is asked about, or refuse what it does not take; None for one graph."""
+    if not (case.uncertainty or is_family(case.graph)):
+        if case.signal != "any":
+            raise ParameterError("signal is for families of graphs, which change; this is one graph: leave it out")
+        return None
+    refuse_of_families(case)
+    family = as_family(case.graph, uncertainty=case.uncertainty)
+    if case.messages is not None or case.leaders is not None:
+        refuse_other_targets(family)
+    return family
 
 
 def _refuse_before_reading(case: Case) -> None:
@@ -290,360 +227,3 @@ def _refuse_before_reading(case: Case) -> None:
     if others and isinstance(case.protocol, Protocol):  # the paper's when their states are read
         refuse_agents(case)
     refuse_exchanged(case.graph)
-
-
-def _certify_family(
-    case: Case, progress: Any, scenario: Mapping[str, Any] | None, origins: Mapping[str, str]
-) -> FamilyCertificate:
-    """Certify a family, or refuse what it does not take."""
-    refuse_of_families(case)
-    family = as_family(case.graph, uncertainty=case.uncertainty)
-    beside = case.messages is not None or case.leaders is not None
-    if beside:
-        refuse_other_targets(family)
-    certificate = certify_family(
-        family,
-        case.protocol,
-        case.initial.x0,
-        sigma0=case.initial.sigma0,
-        signal=case.signal,
-        time_limit=case.asks.time_limit,
-        expectations=case.asks.expectations,
-        scenario=scenario,
-        origins=origins,
-        progress=progress,
-    )
-    return certificate.beside(case.messages, case.leaders) if beside else certificate
-
-
-def _with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: bool) -> Certificate:
-    """Return the certificate of a graph as one of agents of order n on it."""
-    functions = certificate.functions
-    try:
-        prove = prove_agents if agents.cascade is None else prove_cascade
-        proof = prove(
-            certificate.structure,
-            certificate.protocol,
-            agents,
-            functions,
-            certificate.influence,
-            chains.offsets,
-            chains.states,
-        )
-    except NoCertificate as error:
-        raise ParameterError("agents", f"{error}; ask for a smaller decay or a lower order") from None
-    proof = with_instants(with_phases(proof)) if isinstance(proof, AgentsPart) else proof
-    notes, cut_off = [*certificate.notes, *chains.notes], list(certificate.cut_off)
-    motion = None
-    if run and proof.initial_state is not None:
-        limit = SEARCHING * certificate.time_limit
-        with deadline.time_limit(limit), share_of_time(SHARES[0], STEPS[0], cut_off):
-            try:
-                motion = proof.simulate()
-            except SimulationError as error:
-                notes.append(f"simulation: {error}")
-    return certificate.changed(agents=proof, notes=tuple(notes), cut_off=tuple(cut_off), agents_run=motion)
-
-
-def _with_small_delays(certificate: Certificate) -> Certificate:
-    """Add what Lyapunov functions of the whole graph prove with late messages, and the longest delay that was asked."""
-    late, final = certificate.late, certificate.final_state
-    if late is None or late.messages.vehicles is not None:
-        return certificate
-    case = LateCase(
-        certificate.structure,
-        certificate.protocol,
-        certificate.initial_state,
-        stated_ends(certificate.influence, final, certificate.initial_state),
-        certificate.influence,
-        certificate.decaying_forms,
-        late.leaders,
-    )
-    late = replace(case.with_forms(late), longest_delay=case.longest_forgiven(late.messages))
-    certificate, asked = certificate.changed(late=late), certificate.expectations.max_residual
-    if asked is not None and late.messages.age and certificate.graph.n_nodes <= EXACT_NODES:
-        certificate = certificate.changed(late=replace(late, enough=_longest_delay(certificate, case, late, asked)))
-    return certificate
-
-
-def _longest_delay(certificate: Certificate, case: LateCase, late: LateBounds, asked: Fraction) -> Fraction | None:
-    """Return nearly the longest delay that leaves so little, if the check accepts what a certificate states of it."""
-    longest = case.longest(late, asked)
-    if longest is None or longest is late:
-        return None if longest is None else late.messages.age
-    report = certificate.changed(late=longest).checked
-    return longest.messages.age if report.accepted else None
-
-
-def _check_disturbance(disturbance: Any, protocol: ReachingProtocol, graph: SignedDigraph) -> None:
-    """Refuse a disturbance that no run will meet as a run would refuse it."""
-    horizon = float(protocol.T) * (1 + PAST)  # as far as a run would go
-    source = as_disturbance(disturbance, graph.n_nodes, protocol.delta, horizon)
-    source.check(protocol.delta, graph.labels, horizon, rounding_slack(protocol))
-
-
-def _with_word_of_check(certificate: Certificate) -> Certificate:
-    """Check a certificate, and note what the check has to say besides."""
-    report = certificate.checked
-    if report.accepted and report.memory > 1:
-        note = f"the check of this certificate needs more than 1 GB: allow {math.ceil(report.memory)} GB of memory"
-        return certificate.changed(notes=(*certificate.notes, note))
-    if not report.accepted:
-        note = f"the independent check does not accept {report.rejected}: {report.reason}"
-        return certificate.changed(notes=(note, *certificate.notes))
-    return certificate
-
-
-# ---------------------------------------------------------------------- the steps
-
-
-@dataclass
-class CertificateSearch:
-    """A graph, a protocol and what is asked, on the way to a certificate: the steps, in their order.
-
-    Attributes
-    ----------
-    structure : Structure
-    protocol : NominalProtocol or SlidingModeProtocol
-    request : Request
-    initial_state, sigma0 : tuple of N Fraction, or None
-    progress : callable
-        Is told each of :data:`STEPS` as it begins.
-    notes : list of str
-        What went wrong, and other remarks.
-    cut_off : list of str
-        What the time limit ended.
-    """
-
-    structure: Structure
-    protocol: Protocol
-    request: Request
-    initial_state: tuple[Fraction, ...] | None
-    sigma0: tuple[Fraction, ...] | None
-    progress: Callable[[str], None]
-    notes: list[str] = field(default_factory=list)
-    cut_off: list[str] = field(default_factory=list)
-
-    def certificate(self, disturbance: Any, runs: bool, reaching: tuple[ReachingTime, ...] | None) -> Certificate:
-        """Return what the steps find and prove, before the independent check."""
-        with deadline.time_limit(SEARCHING * self.request.time_limit, work=self.request.by_work):
-            trajectory = self.simulation(disturbance) if runs else None
-            lyapunov, proof, numerical = self.paper()
-            search = self.search(proof)
-            limit = self.upper_bound()
-        matrix, result = self.final_state(trajectory)
-        ends = stated_ends(matrix, result, self.initial_state)
-        late, tracking = self.late_messages(ends), self.tracking(ends)
-        proved = [proof.rate, *(V.rate for V in search.functions)]
-        return Certificate(
-            structure=self.structure,
-            protocol=self.protocol,
-            initial_state=self.initial_state,
-            sigma0=self.sigma0,
-            reaching=reaching,
-            lyapunov=lyapunov,
-            proof=proof,
-            searched_functions=search.functions,
-            limit=limit,
-            final_state=result,
-            matrix=matrix,
-            request=self.request,
-            late=late,
-            tracking=tracking,
-            observed=Observations(
-                trajectory=trajectory,
-                numerical_rate=numerical,
-                spectral_rate=_spectral_rate(self.structure, proved, self.notes),
-                search=replace(search, functions=()),
-                cut_off=tuple(self.cut_off),
-                notes=tuple(self.notes),
-            ),
-        )
-
-    def needs_run(self, simulation: bool | None) -> bool:
-        """Tell whether there is to be a run."""
-        n = self.structure.graph.n_nodes
-        if simulation is None and n > SIMULATED_NODES:
-            self.notes.append(f"above {SIMULATED_NODES} agents there is no CVODES run unless it is asked for")
-            return False
-        return simulation is not False
-
-    def simulation(self, disturbance: Any) -> Trajectory | None:
-        """Run the protocol from the initial state with CVODES."""
-        graph = self.structure.graph
-        self.progress(STEPS[0])
-        more: dict[str, Any] = {"samples": FEW_SAMPLES} if graph.n_nodes > SIMULATED_NODES else {}
-        if self.sigma0 is not None:
-            more |= {"sigma0": [float(x) for x in self.sigma0], "disturbance": disturbance}
-        with share_of_time(SHARES[0], STEPS[0], self.cut_off):
-            try:
-                return simulate(graph, self.protocol, [float(x) for x in self.initial_state or ()], **more)
-            except SimulationError as error:
-                self.notes.append(f"simulation: {error}")
-        return None
-
-    def paper(self) -> tuple[LyapunovFunction | None, RateProof, float | None]:
-        """Search the Lyapunov function of the theorem and prove its rate."""
-        self.progress(STEPS[1])
-        V, proof, numerical = None, RateProof(None, ()), None
-        with share_of_time(SHARES[1], STEPS[1], self.cut_off):
-            V, proof, numerical = _search_and_prove(
-                self.structure, theorem_for(self.structure, self.protocol.kind), self.notes
-            )
-        return None if V is None else replace(V, rate=proof.rate, numerical_rate=numerical), proof, numerical
-
-    def search(self, paper: RateProof) -> Search:
-        """Search and prove Lyapunov functions beside the paper's."""
-        self.progress(STEPS[2])
-        search = Search()
-        with share_of_time(SHARES[2], STEPS[2], self.cut_off):
-            search = _search_functions(self.structure, self.protocol, self.request.method, self.request.at, self.notes)
-            self.cut_off += search.cut_off
-        if paper.rate is None and not any(V.proved_rate > 0 for V in search.functions) and self.structure.graph.n_edges:
-            self.notes.insert(0, _precision_note(self.structure.graph))
-        return search
-
-    def upper_bound(self) -> RateBound | None:
-        """Prove the upper bound on the decay rate."""
-        self.progress(STEPS[3])
-        mean = mean_bound(self.structure)
-        with share_of_time(SHARES[3], STEPS[3], self.cut_off):
-            return prove_rate_bound(self.structure)
-        return mean  # which stands if time ran out
-
-    def final_state(self, run: Trajectory | None) -> tuple[Influence, FinalState | None]:
-        """Compute who decides whom, and where the agents end: exactly, or enclosed."""
-        self.progress(STEPS[4])
-        structure, x0 = self.structure, self.initial_state
-        sigma0 = self.sigma0 or (Fraction(0),) * structure.graph.n_nodes
-        first = None if x0 is None else [x - s if s else x for x, s in zip(x0, sigma0, strict=True)]
-        matrix, result = None, None
-        by_work = self.request.by_work
-        seconds = (ENDING_WORK if by_work else ENDING) * self.request.time_limit
-        half = seconds / 2 if takes_long(structure.graph) else math.inf
-        with deadline.time_limit(half, work=by_work), share_of_time(1, f"exact {STEPS[4]}", self.cut_off):
-            found = influence(structure)
-            if first is not None and found.exact:
-                result = final_state(structure, first, matrix=found)
-            matrix = found
-        matrix = matrix or influence_in_floats(structure)  # whatever the time
-        if not matrix.exact:
-            try:
-                with deadline.time_limit(half, work=by_work):
-                    enclosed = enclose(matrix)
-                    result = None if first is None else enclosed_final_state(enclosed, first)
-                matrix = enclosed
-            except OutOfTime:
-                self.cut_off.append(STEPS[4])
-            except NotEnclosedError as error:
-                self.notes.append(f"the final state is floating point only: {error}")
-        if result is None and first is not None:
-            result = final_state(structure, first, matrix=matrix)
-            if not np.isfinite(np.asarray(result)).all():
-                result = None  # what the note of the enclosure tells
-        if run is not None and result is not None:
-            gap = float(np.abs(run.final_state - np.asarray(result)).max())
-            if gap > SETTLED * max(float(max(map(abs, (*(x0 or ()), *sigma0)))), 1e-300):
-                self.notes.append(
-                    f"the simulated run is still {gap:.1e} from the final state: its slowest modes had not settled"
-                )
-        return matrix, result
-
-    def late_messages(self, ends: Sequence[Interval] | None) -> LateBounds | None:
-        """Bound what late messages leave at the deadline; None if nothing is asked of them."""
-        messages = self.request.messages
-        if messages is None:
-            return None
-        if any(self.sigma0 or ()):
-            raise ParameterError(
-                (
-                    "late messages ask for sigma(0) = 0, so that no sliding variable moves; leave ",
-                    Change("sigma0"),
-                    " out",
-                )
-            )
-        return bound_late(self.structure, self.protocol, messages, self.initial_state, ends, self.request.leaders)
-
-    def tracking(self, ends: Sequence[Interval] | None) -> Tracking | None:
-        """Bound how followers track leaders that move; None if nothing is asked of that, or messages are late."""
-        leaders = self.request.leaders
-        if leaders is None or self.request.messages is not None:
-            return None
-        try:
-            return bound_tracking(self.structure, self.protocol, leaders, self.initial_state, ends)
-        except LMIError as error:
-            self.notes.append(f"moving leaders: {error}")
-            return None
-
-
-def _search_and_prove(
-    structure: Structure, theorem: Theorem, notes: list[str]
-) -> tuple[LyapunovFunction | None, RateProof, float | None]:
-    n = structure.graph.n_nodes
-    nothing = RateProof(None, ())
-    if n > SEARCH_NODES:
-        notes.append(f"the search of the paper's certificate stops at {SEARCH_NODES} nodes; the graph has {n}")
-        return None, nothing, None
-    try:
-        with np.errstate(all="ignore"):
-            search = partial(_search, theorem, structure)
-            (V,) = apart(search) if n > APART_NODES else search()
-            numerical = theorem.rate(structure, V) if V.blocks else None
-    except OutOfTime:
-        raise
-    except (LMIError, np.linalg.LinAlgError) as error:
-        notes.append(f"no Lyapunov matrix was found: {error}")
-        return None, nothing, None
-    except (HypothesisError, ZeroDivisionError, OverflowError):
-        # The structure meets the hypotheses exactly, so it is the floats that do not.
-        notes.append("no Lyapunov matrix was found: the weights lie too far apart for floating point")
-        return None, nothing, None
-    if n > EXACT_NODES:
-        notes.append(f"the paper's certificate is proved up to {EXACT_NODES} nodes; the graph has {n}")
-        return V, nothing, numerical
-    with np.errstate(all="ignore"):
-        proof = theorem.prove(structure, V)
-    if proof.failed:
-        notes.append(proof.failed)
-    return V, proof, numerical
-
-
-def _search(theorem: Theorem, structure: Structure) -> list[LyapunovFunction]:
-    return [theorem.lyapunov(structure)]
-
-
-def _search_functions(
-    structure: Structure, protocol: Protocol, method: str, at: Fraction | None, notes: list[str]
-) -> Search:
-    """Search Lyapunov functions for the instants that the screen reports, and for ``at``."""
-    gain = protocol.gain
-    clocks = [float(gain.clock_at_remaining(1 - fraction)) for fraction in FRACTIONS]
-    own = None if at is None else float(gain.clock_at_remaining(float(1 - at / protocol.T)))
-    if structure.graph.n_nodes <= EXACT_NODES:
-        search = search_functions(ErrorSystem(structure), method, clocks, own)
-    else:
-        search = search_large(structure, method, clocks if own is None else [*clocks, own])
-    notes.extend(search.notes)
-    return search
-
-
-def _precision_note(graph: SignedDigraph) -> str:
-    """Tell how far apart the weights lie, where no rate was proved."""
-    decades = graph.weight_decades
-    if decades < MANY_DECADES:
-        return "no rate was proved"
-    return f"no rate was proved; the weights span {decades} decades, which may be too many for float64"
-
-
-def _spectral_rate(structure: Structure, proved: Sequence[Fraction | None], notes: list[str]) -> float | None:
-    if int(np.bincount(structure.strong_component).max()) > FACTOR_NODES:
-        notes.append(f"the spectral rate is not computed for strong components above {FACTOR_NODES} nodes")
-        return None
-    try:
-        rate = laplacian_spectrum(structure).spectral_rate
-    except np.linalg.LinAlgError:
-        rate = math.nan
-    if rate is not None and not (rate > 0 and math.isfinite(rate) and max(x or 0 for x in proved) <= rate * (1 + 1e-6)):
-        notes.append("the spectral rate was not found, or is lost in the rounding of float64")
-        return None
-    return rate

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable, Mapping, Sized
+from collections.abc import Callable, Iterable, Mapping, Sequence, Sized
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -17,6 +17,7 @@ from ptcc_certify.bounds.input.initial_set import read_initial_set
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.errors import Change, NumberError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import as_state
 from ptcc_certify.graphs.rationals import as_fraction, shorten, writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
@@ -30,6 +31,7 @@ from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.parameters import parameter
 from ptcc_certify.model.reaching_time import ReachingTime, certified_reaching_times
+from ptcc_certify.model.restricted_signals import SignalClass, read_signal
 
 #: Longest weights and initial states, over a common denominator: so many bits over ``N^(5/4)``, for seconds of work.
 LONGEST_BITS = 470_000
@@ -57,6 +59,8 @@ class Request:
         How late is what agents hear.
     leaders : MovingLeaders or None
         How leaders move.
+    signal : {"any", "constant"}, DwellTime, JointWindows or ClockShares
+        Of a family: restricted signals of which more is claimed than of every signal.
     time_limit : float
         Seconds that the searches were given, infinity for no limit.
     by_work : bool
@@ -78,11 +82,40 @@ class Request:
     noise: Fraction | None = None
     messages: LateMessages | None = None
     leaders: MovingLeaders | None = None
+    signal: SignalClass = "any"
     time_limit: float = math.inf
     by_work: bool = False
     expectations: Expectations = field(default_factory=Expectations)
     scenario: Mapping[str, Any] | None = None
     origins: Mapping[str, str] = field(default_factory=dict, hash=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What a certificate answers: of whom, under which protocol, from where, and what was asked beside.
+
+    Attributes
+    ----------
+    subject : Structure or Family
+        The graph, with its structure, or the family.
+    protocol : NominalProtocol or SlidingModeProtocol
+    initial_state : tuple of N Fraction, or None
+        ``X(0)``.
+    sigma0 : tuple of N Fraction, or None
+        ``sigma(0)`` of the sliding-mode protocol; None for the nominal one.
+    request : Request
+    """
+
+    subject: Structure | Family
+    protocol: Protocol
+    initial_state: tuple[Fraction, ...] | None = None
+    sigma0: tuple[Fraction, ...] | None = None
+    request: Request = field(default_factory=Request)
+
+    @property
+    def labels(self) -> Sequence[str]:
+        """The names of the agents."""
+        return self.subject.labels if isinstance(self.subject, Family) else self.subject.graph.labels
 
 
 def origins_of(graph: Any, initial: InitialState) -> dict[str, str]:
@@ -123,6 +156,7 @@ def read_request(
         noise=None if asks.noise is None else parameter("noise", asks.noise),
         messages=case.messages,
         leaders=case.leaders,
+        signal=read_signal(case.signal),
         time_limit=read_seconds(asks.time_limit, structure.graph),
         by_work=asks.time_limit is None,
         expectations=asks.expectations,

@@ -15,7 +15,7 @@ import numpy as np
 
 from lmi.exact.numbers import integers
 from ptcc_certify.bounds.family_deviation import deviation_on_clock
-from ptcc_certify.certificate.family_content import BoundFunction, ComponentProof, FamilyContent
+from ptcc_certify.certificate.family_proof import BoundFunction, ComponentProof, FamilyProof
 from ptcc_certify.certificate.restricted_claims import RateClaim
 from ptcc_certify.checker.family_function import Scaled
 from ptcc_certify.checker.family_limits import WeightedMean
@@ -67,12 +67,12 @@ class SwitchedFunction:
         return self.factor * max(V.largest(sizes) for V in self.functions)
 
 
-def deviation_of_signal(certificate: FamilyContent, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
+def deviation_of_signal(proof: FamilyProof, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
     """Bound ``|x_k(t) - x_k(T)|`` for the signals that were asked for, (N, M); what holds for every signal counts.
 
     Parameters
     ----------
-    certificate : FamilyContent
+    proof : FamilyProof
         With an initial state.
     remaining : (M,) array_like
         ``1 - t/T`` at the instants, in [0, 1].
@@ -86,33 +86,33 @@ def deviation_of_signal(certificate: FamilyContent, remaining: Sequence[float] |
     >>> bool((deviation_of_signal(cert, [0.01]) <= cert.deviation_bound([0.01])).all())
     True
     """
-    bounds = certificate.deviation_bound(remaining)
-    if not (claims := claims_with_forms(certificate)):
+    bounds = proof.deviation_bound(remaining)
+    if not (claims := claims_with_forms(proof)):
         return bounds
-    clock = np.asarray(certificate.protocol.gain.clock_at_remaining(np.atleast_1d(remaining)))
+    clock = np.asarray(proof.protocol.gain.clock_at_remaining(np.atleast_1d(remaining)))
     for claim in claims:
-        part = certificate.parts[claim.component]
+        part = proof.parts[claim.component]
         nodes = part.component.nodes
-        x = [certificate.initial_state[v] for v in nodes.tolist()]  # type: ignore[index]
-        own = _deviation(certificate, claim, part, x, clock)
+        x = [proof.initial_state[v] for v in nodes.tolist()]  # type: ignore[index]
+        own = _deviation(proof, claim, part, x, clock)
         if own is not None:
             bounds[nodes] = np.minimum(bounds[nodes], own)
     return bounds
 
 
-def nearer_for_signal(certificate: FamilyContent) -> bool:
+def nearer_for_signal(proof: FamilyProof) -> bool:
     """Tell whether more is proved of the decay for the signals that were asked for than for every signal."""
-    return certificate.common and certificate.rate_of_signal is not None and bool(claims_with_forms(certificate))
+    return proof.common and proof.rate_of_signal is not None and bool(claims_with_forms(proof))
 
 
-def claims_with_forms(certificate: FamilyContent) -> list[RateClaim]:
+def claims_with_forms(proof: FamilyProof) -> list[RateClaim]:
     """Return the claims of rates that no function for every signal proves."""
-    rates = (claim for claim in certificate.restricted if isinstance(claim, RateClaim))
+    rates = (claim for claim in proof.restricted if isinstance(claim, RateClaim))
     return [claim for claim in rates if claim.forms is not None and claim.rate > 0]
 
 
 def _deviation(
-    certificate: FamilyContent, claim: RateClaim, part: ComponentProof, x: Sequence[Fraction], clock: np.ndarray
+    proof: FamilyProof, claim: RateClaim, part: ComponentProof, x: Sequence[Fraction], clock: np.ndarray
 ) -> np.ndarray | None:
     """Bound the agents of a component; None where so many switches are allowed that nothing would be said."""
     assert claim.forms is not None
@@ -123,7 +123,7 @@ def _deviation(
     if not isinstance(claim.signal, DwellTime):  # one mode acts for ever
         own = [deviation_on_clock(V, part.rest_states, x, clock) for V in functions]
         return np.max([one for one in own if one is not None], axis=0)
-    switches = claim.signal.switches(certificate.protocol.T) if claim.signal.clock == "t" else 1
+    switches = claim.signal.switches(proof.protocol.T) if claim.signal.clock == "t" else 1
     if switches * max(map(int.bit_length, claim.ratio.as_integer_ratio())) > _BITS:
         return None
     V = SwitchedFunction(functions, claim.rate, claim.ratio**switches)

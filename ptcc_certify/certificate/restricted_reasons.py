@@ -12,13 +12,13 @@ from ptcc_certify.theorems.family_behaviour import DEPENDS
 from ptcc_certify.theorems.joint_windows import joint_behaviour
 
 if TYPE_CHECKING:
-    from ptcc_certify.certificate.family_content import FamilyContent
+    from ptcc_certify.certificate.family_proof import FamilyProof
 
 #: What is told of rates below every number that is written.
 TOO_SMALL = "a rate exists, too small to matter"
 
 
-def reasons_for_none(certificate: FamilyContent) -> dict[int, tuple[str, bool]]:
+def reasons_for_none(proof: FamilyProof) -> dict[int, tuple[str, bool]]:
     """Return why components have no claim for the signals asked for, and whether that leaves open what they do.
 
     Examples
@@ -29,13 +29,13 @@ def reasons_for_none(certificate: FamilyContent) -> dict[int, tuple[str, bool]]:
     >>> reasons_for_none(certify(family, p, signal=windows))
     {0: ('stability: a rate exists, too small to matter, and none is certified', True)}
     """
-    if certificate.signal == "any" or len(certificate.restricted) >= MANY_CLAIMS:
+    if proof.signal == "any" or len(proof.restricted) >= MANY_CLAIMS:
         return {}
-    claims = certificate.restricted
+    claims = proof.restricted
     told = {one.component for one in claims if not isinstance(one, ShareClaim) or one.behaviour is not None}
     parts = {
         number: part
-        for number, part in enumerate(certificate.parts)
+        for number, part in enumerate(proof.parts)
         if number not in told and part.component.nodes.size > 1 and part.component.behaviour is not None
     }
     result = {}
@@ -43,12 +43,12 @@ def reasons_for_none(certificate: FamilyContent) -> dict[int, tuple[str, bool]]:
         if part.component.behaviour != DEPENDS:
             rate = "no rate is proved" if part.rate is None else f"rate {down(part.rate)}"
             result[number] = f"{rate}, as for every signal; nothing more is proved", False
-        elif isinstance(certificate.signal, JointWindows):
+        elif isinstance(proof.signal, JointWindows):
             behaviour = joint_behaviour(part.component)
             small = f"{behaviour}: {TOO_SMALL}, and none is certified"
             nothing = "all edges together do not bring the agents to rest, or not to known states; nothing is proved"
             result[number] = nothing if behaviour is None else small, True
-        elif isinstance(certificate.signal, ClockShares):
+        elif isinstance(proof.signal, ClockShares):
             result[number] = "no function of all modes that falls with these shares was found; nothing is proved", True
         else:
             result[number] = "switches never end, and each may undo what was reached; nothing is proved", True

@@ -15,7 +15,7 @@ from lmi.search_time import share_of_time
 from ptcc_certify.bounds.attracting_box import have_common_denominator
 from ptcc_certify.bounds.family_final_state import ValueEnds, value_ends
 from ptcc_certify.bounds.kept_means import mean_of_shares
-from ptcc_certify.certificate.family_content import ComponentProof
+from ptcc_certify.certificate.family_proof import ComponentProof
 from ptcc_certify.certificate.restricted_claims import (
     Claim,
     FinalValueClaim,

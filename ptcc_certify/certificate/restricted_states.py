@@ -10,21 +10,21 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ptcc_certify.certificate.family_content import FamilyContent
+    from ptcc_certify.certificate.family_proof import FamilyProof
     from ptcc_certify.checker.reading import Interval
 
 
-def last_states(certificate: FamilyContent) -> list[Interval | None]:
+def last_states(proof: FamilyProof) -> list[Interval | None]:
     """Return the ends between which agents stay whose last mode decides; None of the others."""
-    result: list[Interval | None] = [None] * certificate.family.n_nodes
-    for number, claim in certificate.ends_of_signal.items():
-        nodes = certificate.parts[number].component.nodes.tolist()
+    result: list[Interval | None] = [None] * proof.family.n_nodes
+    for number, claim in proof.ends_of_signal.items():
+        nodes = proof.parts[number].component.nodes.tolist()
         for v, ends in zip(nodes, claim.final_states or (), strict=False):
             result[v] = ends
-    return [other if ends is None else ends for ends, other in zip(constant_states(certificate), result, strict=True)]
+    return [other if ends is None else ends for ends, other in zip(constant_states(proof), result, strict=True)]
 
 
-def constant_states(certificate: FamilyContent) -> list[Interval | None]:
+def constant_states(proof: FamilyProof) -> list[Interval | None]:
     """Return the ends between which agents end if mode and weights never change; None where these are not claimed.
 
     Examples
@@ -34,24 +34,24 @@ def constant_states(certificate: FamilyContent) -> list[Interval | None]:
     >>> [str(x) for x in constant_states(cert)[0]]
     ['2', '3']
     """
-    result: list[Interval | None] = [None] * certificate.family.n_nodes
-    for number, claim in certificate.final_values.items():
-        nodes = certificate.parts[number].component.nodes.tolist()
+    result: list[Interval | None] = [None] * proof.family.n_nodes
+    for number, claim in proof.final_values.items():
+        nodes = proof.parts[number].component.nodes.tolist()
         for v, ends in zip(nodes, claim.final_states or (), strict=False):
             result[v] = ends
     return result
 
 
-def states_of_signal(certificate: FamilyContent) -> list[Interval | None]:
+def states_of_signal(proof: FamilyProof) -> list[Interval | None]:
     """Return the final states for every signal, and where there are none, those for the signals that were asked for."""
-    pairs = zip(certificate.final_states or (), last_states(certificate), strict=False)
+    pairs = zip(proof.final_state or (), last_states(proof), strict=False)
     return [other if ends is None else ends for ends, other in pairs]
 
 
-def ends_for_signal(certificate: FamilyContent) -> list[Interval | None]:
+def ends_for_signal(proof: FamilyProof) -> list[Interval | None]:
     """Return the nearest ends that are proved for the signals that were asked for; None of agents that have none.
 
-    All are None where all signals were asked for, which :attr:`FamilyContent.final_states` tells of.
+    All are None where all signals were asked for, which :attr:`FamilyProof.final_state` tells of.
 
     Examples
     --------
@@ -60,8 +60,8 @@ def ends_for_signal(certificate: FamilyContent) -> list[Interval | None]:
     >>> [str(x) for x in ends_for_signal(cert)[0]]
     ['2', '3']
     """
-    unknown: list[Interval | None] = [None] * certificate.family.n_nodes
-    if certificate.signal == "any":
+    unknown: list[Interval | None] = [None] * proof.family.n_nodes
+    if proof.signal == "any":
         return unknown
-    pairs = zip(last_states(certificate), certificate.final_states or unknown, strict=True)
+    pairs = zip(last_states(proof), proof.final_state or unknown, strict=True)
     return [every if ends is None else ends for ends, every in pairs]

@@ -14,8 +14,9 @@ from ptcc_certify.bounds.envelope import FRACTIONS, LAST_INSTANTS
 from ptcc_certify.bounds.input.effort import LIMITS
 from ptcc_certify.bounds.late_messages import LateBounds, delays, read_messages
 from ptcc_certify.bounds.tracking import asked_leaders, read_leaders
-from ptcc_certify.certificate.certificate_data import Content, Observations
-from ptcc_certify.certificate.family_content import FamilyContent
+from ptcc_certify.certificate.evidence import Evidence, Observations
+from ptcc_certify.certificate.family_proof import FamilyProof
+from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.certificate.section_writer import Writer, finite, readable, text, write
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
@@ -112,15 +113,15 @@ def _member(quotient: Quotient, entry: Mapping[str, Any]) -> Member:
     return Member(number, tuple(levels))
 
 
-def write_unproved(content: Content | FamilyContent) -> dict[str, Any]:
+def write_unproved(proof: GraphProof | FamilyProof) -> dict[str, Any]:
     """Return the late messages or moving leaders that were asked for where nothing is proved of them."""
-    messages, leaders, late = content.asked_messages, content.asked_leaders, content.late
-    if (late is not None and late.says_something) or content.tracking is not None:
+    messages, leaders, late = proof.asked_messages, proof.asked_leaders, proof.late
+    if (late is not None and late.says_something) or proof.tracking is not None:
         return {}
     asked: dict[str, Any] = {}
     if messages is not None:
-        of = content.graph if isinstance(content, Content) else content.family
-        asked["messages"] = write(Delays, delays(messages, of), Writer(content.labels))
+        of = proof.graph if isinstance(proof, GraphProof) else proof.family
+        asked["messages"] = write(Delays, delays(messages, of), Writer(proof.labels))
         del asked["messages"]["leaders"]
     return asked if leaders is None else {**asked, "leaders": write(LeadersAsked, asked_leaders(leaders), Writer(()))}
 
@@ -165,38 +166,49 @@ def nothing_proved(
     return LateBounds(messages, structure, gain, relative, leaders=leaders)
 
 
-def _write_unverified(content: Content) -> dict[str, Any]:
-    search, envelope = content.search, content.envelope
+def write_unverified(certificate: Evidence) -> dict[str, Any]:
+    """Return what was asked, searched and seen."""
+    proof, notes = certificate.proof, list(certificate.observed.notes)
+    scenario = None if proof.request.scenario is None else dict(proof.request.scenario)
+    origins = dict(proof.origins)
+    if isinstance(proof, FamilyProof):
+        bounds = [(part.component, part.upper_bound) for part in proof.parts]
+        return {
+            "upper_bounds": [None if b is None else upper_bound_entry(Quotient.of(c), b) for c, b in bounds],
+            "asked": {"behaviour": proof.expectations.behaviour} | write_unproved(proof),
+            "read": dict(proof.family.read) or None,
+            **{"origins": origins, "scenario": scenario, "notes": notes},
+        }
+    search, envelope, observed = certificate.search, proof.envelope, certificate.observed
     remaining = (*(1 - f for f in FRACTIONS), *LAST_INSTANTS)
     residual = {str(1 - q if q > 1e-3 else f"1-{q:g}"): q for q in remaining}
     floats = None
-    if content.final_state is not None and not content.final_state.exact:
-        floats = dict(zip(content.graph.labels, map(finite, np.asarray(content.final_state).tolist()), strict=True))
+    if proof.final_state is not None and not proof.final_state.exact:
+        floats = dict(zip(proof.labels, map(finite, np.asarray(proof.final_state).tolist()), strict=True))
     return {
-        "spectral": finite(content.spectral_rate),
-        "optimality_ratio": content.optimality_ratio,
-        "paper_rate": finite(content.numerical_rate),
-        "rounding_loss": finite(content.rounding_loss),
+        "spectral": finite(observed.spectral_rate),
+        "optimality_ratio": proof.optimality_ratio,
+        "paper_rate": finite(observed.numerical_rate),
+        "rounding_loss": finite(proof.rounding_loss),
         "search": {
-            "method": content.method,
-            "at": None if content.at is None else float(content.at),
+            "method": proof.method,
+            "at": None if proof.at is None else float(proof.at),
             "searched": {kind: finite(rate) for kind, rate in search.searched.items()},
             "diagonal_limit": finite(search.diagonal_limit),
         },
-        "residual": {name: finite(envelope.residual(q)) for name, q in residual.items()} if content.direct else None,
+        "residual": {name: finite(envelope.residual(q)) for name, q in residual.items()} if proof.direct else None,
         "final_state": floats,
-        "asked": _write_request(content.request) | write_unproved(content),
-        "scenario": None if content.request.scenario is None else dict(content.request.scenario),
-        "origins": dict(content.request.origins),
-        "simulation": _write_run(content),
-        "time_limit": finite(content.time_limit),
-        "cut_off": list(content.cut_off),
-        "notes": list(content.notes),
+        "asked": _write_request(proof.request) | write_unproved(proof),
+        **{"scenario": scenario, "origins": origins},
+        "simulation": _write_run(certificate),
+        "time_limit": finite(proof.time_limit),
+        "cut_off": list(observed.cut_off),
+        "notes": notes,
     }
 
 
-def _write_run(content: Content) -> dict[str, Any] | None:
-    run, comparison = content.trajectory, content.comparison
+def _write_run(certificate: Evidence) -> dict[str, Any] | None:
+    run, comparison = certificate.trajectory, certificate.comparison
     if comparison is None:
         return None
     section = {
@@ -215,12 +227,12 @@ def _write_run(content: Content) -> dict[str, Any] | None:
     return section | {
         "sliding_ratio": finite(comparison.sliding_ratio),
         "reaching_kept": comparison.reaching_kept,
-        "reached": dict(zip(content.graph.labels, map(finite, run.sliding.reaching_z.tolist()), strict=True)),
+        "reached": dict(zip(certificate.proof.labels, map(finite, run.sliding.reaching_z.tolist()), strict=True)),
         "disturbance_bounded_by": run.sliding.bounded_by,
     }
 
 
-def _read_observations(section: Mapping[str, Any]) -> Observations:
+def read_observations(section: Mapping[str, Any]) -> Observations:
     """Read what the file says of searches; other observations are made anew."""
     return Observations(cut_off=_texts(section.get("cut_off")), notes=_texts(section.get("notes")))
 
@@ -239,11 +251,14 @@ def _write_request(request: Request) -> dict[str, Any]:
     }
 
 
-def _read_request(unverified: Mapping[str, Any], initial_set: InitialSet | None) -> Request:
-    """Read what was asked; nothing of it is claimed, so that what cannot be read is left out."""
+def read_request(unverified: Mapping[str, Any], initial_set: InitialSet | None, named: bool) -> Request:
+    """Read what was asked, and where it comes from if that is ``named``.
+
+    Nothing of it is claimed, so that what cannot be read is left out.
+    """
     section, search, seconds = (unverified.get(key) for key in ("asked", "search", "time_limit"))
     scenario, origins = unverified.get("scenario"), unverified.get("origins")
-    origins = origins.items() if isinstance(origins, dict) else ()
+    origins = origins.items() if isinstance(origins, dict) and named else ()
     section = section if isinstance(section, dict) else {}
     method, behaviour = search.get("method") if isinstance(search, dict) else None, section.get("behaviour")
     try:

@@ -24,8 +24,8 @@ from ptcc_certify.bounds.envelope import Envelope
 from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.bounds.tracking import Tracking
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
-from ptcc_certify.certificate.certificate_data import Content
-from ptcc_certify.certificate.family_content import FamilyContent
+from ptcc_certify.certificate.family_proof import FamilyProof
+from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.certificate.restricted_bounds import deviation_of_signal
 from ptcc_certify.checker.input_formulas import InitialSet, root_above
 from ptcc_certify.errors import Change, Sentence, joined
@@ -69,44 +69,42 @@ class Use(NamedTuple):
     advice: Sentence = ""
 
 
-def use_of(certificate: Content) -> Use:
-    """Return what the bounds of a graph's certificate are worth: of all that is asked, the worst."""
-    if certificate.constant:
+def use_of(proof: GraphProof | FamilyProof) -> Use:
+    """Return what the bounds are worth: of all that is asked, the worst; of a family for the signals asked for."""
+    if proof.constant and isinstance(proof, GraphProof):
         return Use(True, "nothing to decay")
-    if certificate.agents is not None:
-        return _use_of_agents(certificate.agents)
-    if certificate.late is not None:
-        return _use_of_late(certificate.late, certificate.longest_way)
-    if certificate.tracking is not None:
-        return _use_of_tracking(certificate.tracking)
-    if certificate.effort is not None and certificate.effort.residual:
-        return Use(*_limited_usefulness(certificate))
-    useful, remark, rho2 = _usefulness(certificate)
-    return Use(useful, remark, *_advise(certificate, rho2))
+    if proof.agents is not None:
+        return _use_of_agents(proof.agents)
+    if proof.late is not None:
+        return _use_of_late(proof.late, proof.longest_way)
+    if proof.tracking is not None:
+        return _use_of_tracking(proof.tracking)
+    if isinstance(proof, FamilyProof):
+        return _use_of_family(proof)
+    if proof.effort is not None and proof.effort.residual:
+        return Use(*_limited_usefulness(proof))
+    useful, remark, rho2 = _usefulness(proof)
+    return Use(useful, remark, *_advise(proof, rho2))
 
 
-def use_of_family(certificate: FamilyContent) -> Use:
-    """Return what the bounds of a family's certificate are worth for every signal, and for those asked for."""
-    if certificate.late is not None:
-        return _use_of_late(certificate.late, certificate.longest_way)
-    if certificate.tracking is not None:
-        return _use_of_tracking(certificate.tracking)
-    useful = _usefulness_of_signal(certificate)
+def _use_of_family(proof: FamilyProof) -> Use:
+    """Return what the bounds of a family are worth for every signal, and for those asked for."""
+    useful = _usefulness_of_signal(proof)
     caveat, rho2 = "", None
     if useful is False:
-        rho2 = _useful_rho2_of_family(certificate) if certificate.direct else _useful_rho2_while_driven(certificate)
+        rho2 = _useful_rho2_of_family(proof) if proof.direct else _useful_rho2_while_driven(proof)
     effects = [] if rho2 is None else ["leaves 1 %"]
-    p, rate = certificate.protocol, certificate.rate
+    p, rate = proof.protocol, proof.rate
     mu3 = None
-    if certificate.common and not certificate.bounded:
-        grows = certificate.unbounded
+    if proof.common and not proof.bounded:
+        grows = proof.unbounded
         caveat = "the input is not bounded for some signal" if grows else "the input is not proved bounded"
-        if not grows and certificate.signal != "any":
+        if not grows and proof.signal != "any":
             caveat += " for every signal"
         if rate is not None:
             rho2 = max(rho2 or Fraction(0), _rounded_up(2 / (rate * p.kappa)))
             effects.append("bounds the input")
-    if certificate.sliding_bounded is False and certificate.sliding_peaks is None:
+    if proof.sliding_bounded is False and proof.sliding_peaks is None:
         caveat = caveat or "the input is not proved bounded"
         mu3 = _rounded_up(1 / p.kappa)
         effects += [] if "bounds the input" in effects else ["bounds the input"]
@@ -122,9 +120,9 @@ def _gains(rho2: Fraction | None, mu3: Fraction | None, effects: list[str]) -> S
 # ---------------------------------------------------------------------- one graph
 
 
-def _usefulness(certificate: Content) -> tuple[bool, str, Fraction | None]:
+def _usefulness(proof: GraphProof) -> tuple[bool, str, Fraction | None]:
     """Return whether the bound is useful, what it says, and a ``rho2`` that would make it so."""
-    envelope, p, direct = certificate.envelope, certificate.protocol, certificate.direct
+    envelope, p, direct = proof.envelope, proof.protocol, proof.direct
     span = p.T if direct else p.span
     z, instant = envelope.coordinates, "0.99 T"
     begin = f"{z}(0)"
@@ -135,9 +133,9 @@ def _usefulness(certificate: Content) -> tuple[bool, str, Fraction | None]:
     remark = f"||{z}|| <= {up(share, 2)} ||{begin}|| at {instant}"
     if share <= USEFUL:
         return True, remark, None
-    of_set = certificate.effort is not None and certificate.effort.initial_set is not None
-    if direct and not of_set and (way := certificate.longest_way) is not None:
-        worst = float(certificate.deviation_bound([float(LAST)]).max(initial=0.0))
+    of_set = proof.effort is not None and proof.effort.initial_set is not None
+    if direct and not of_set and (way := proof.longest_way) is not None:
+        worst = float(proof.deviation_bound([float(LAST)]).max(initial=0.0))
         if worst <= USEFUL * way:
             return True, f"every agent within {up(worst, 2)} of its final state at {instant}", None
     return False, remark, _useful_rho2(envelope, constant, p.kappa)
@@ -164,9 +162,9 @@ def _use_of_agents(part: AgentsAnswer) -> Use:
     return Use(useful, remark, caveat, advice)
 
 
-def _limited_usefulness(certificate: Content) -> tuple[bool, str]:
+def _limited_usefulness(proof: GraphProof) -> tuple[bool, str]:
     """Return the same of what is left at the deadline itself under the limits of the gain that were asked about."""
-    effort, x0, way = certificate.effort, certificate.initial_state, certificate.longest_way
+    effort, x0, way = proof.effort, proof.initial_state, proof.longest_way
     residual = () if effort is None else effort.residual
     region = None if effort is None else effort.initial_set
     noisy = any(entry.noise is not None for entry in residual)
@@ -176,7 +174,7 @@ def _limited_usefulness(certificate: Content) -> tuple[bool, str]:
             return True, f"under the limits every agent within {up(worst, 2)} of its final state at T"
     norm = max(entry.norm if entry.noisy_norm is None else entry.noisy_norm for entry in residual)
     remark = f"under the limits ||E|| <= {up(norm, 2)} at T"
-    rows = certificate.structure.graph.exact_rows(range(certificate.structure.graph.n_nodes))
+    rows = proof.structure.graph.exact_rows(range(proof.structure.graph.n_nodes))
     if region is not None:  # the largest |e_k(0)| of the set is attained, the norm that goes with it is larger
         largest = max(region.largest(row) for row in rows)
         return norm <= Fraction(USEFUL) * largest, f"{remark} from all these initial states"
@@ -187,9 +185,9 @@ def _limited_usefulness(certificate: Content) -> tuple[bool, str]:
     return share <= USEFUL, f"under the limits ||E|| <= {up(share, 2)} ||E(0)|| at T"
 
 
-def _advise(certificate: Content, rho2: Fraction | None) -> tuple[str, Sentence]:
+def _advise(proof: GraphProof, rho2: Fraction | None) -> tuple[str, Sentence]:
     """Return what is not proved of the input, and gains that bound it and, given ``rho2``, leave a hundredth."""
-    effort, p, rate = certificate.effort, certificate.protocol, certificate.rate
+    effort, p, rate = proof.effort, proof.protocol, proof.rate
     if effort is None:
         return "", ""
     sliding_open = effort.peak is None and effort.sliding is not None and not effort.sliding.bounded
@@ -259,38 +257,38 @@ def _use_of_tracking(tracking: Tracking) -> Use:
 # ---------------------------------------------------------------------- families
 
 
-def _useful_rho2_of_family(certificate: FamilyContent) -> Fraction | None:
+def _useful_rho2_of_family(proof: FamilyProof) -> Fraction | None:
     """Return a short ``rho2`` with which the bounds at hand leave 1 % at 0.99 T; None if there is none within reach.
 
     ``rho2`` enters the bounds by the clock alone, ``s = rho1 t + rho2 kappa ln(T/(T-t))``.
     """
-    gain, rho2 = certificate.protocol.gain, certificate.protocol.parameters["rho2"]
+    gain, rho2 = proof.protocol.gain, proof.protocol.parameters["rho2"]
     kappa, last = float(gain.pole / rho2), -math.log(float(LAST))
-    candidates = float(rho2) * np.geomspace(1, _LARGEST, max(15, min(500, 10**6 // certificate.family.n_nodes)))
+    candidates = float(rho2) * np.geomspace(1, _LARGEST, max(15, min(500, 10**6 // proof.family.n_nodes)))
     clock = float(gain.clock_at_remaining(float(LAST))) + (candidates - float(rho2)) * kappa * last
-    if certificate.initial_state is not None:
+    if proof.initial_state is not None:
         with np.errstate(over="ignore", invalid="ignore"):  # functions with negative rates
-            left = certificate.deviation_at(clock).max(axis=0)
-        enough = left <= float(max(map(abs, certificate.initial_state)) * LAST)
+            left = proof.deviation_at(clock).max(axis=0)
+        enough = left <= float(max(map(abs, proof.initial_state)) * LAST)
     else:
         enough = np.ones(clock.size, bool)
-        for part in (part for part in certificate.parts if part.component.nodes.size > 1):
+        for part in (part for part in proof.parts if part.component.nodes.size > 1):
             decays = [math.sqrt(V.overshoot) * np.exp(-float(V.rate) / 2 * clock) for V in part.functions if V.rate > 0]
             enough &= np.min(decays or [np.full(clock.size, np.inf)], axis=0) <= float(LAST)
     return Fraction(up(float(candidates[enough.argmax()]), 3)) if enough.any() else None
 
 
-def _useful_rho2_while_driven(certificate: FamilyContent) -> Fraction | None:
+def _useful_rho2_while_driven(proof: FamilyProof) -> Fraction | None:
     """Return the same at ``T_r + 0.99 T_s`` where sliding variables move; None without an initial state.
 
     They drive the agents with the gain, too: the bound for every signal is formed anew with every ``rho2``.
     """
-    protocol = certificate.protocol
-    if certificate.initial_state is None or certificate.rate is None:
+    protocol = proof.protocol
+    if proof.initial_state is None or proof.rate is None:
         return None
 
     def suffices(rho2: float) -> bool:
-        other = replace(certificate, protocol=protocol.replace(rho2=Fraction(up(rho2, 3))))
+        other = replace(proof, question=replace(proof.question, protocol=protocol.replace(rho2=Fraction(up(rho2, 3)))))
         left, enough = _target(other)
         return bool(other.deviation_bound([left]).max() <= enough)
 
@@ -306,21 +304,21 @@ def _useful_rho2_while_driven(certificate: FamilyContent) -> Fraction | None:
     return Fraction(up(high, 3))
 
 
-def _target(certificate: FamilyContent) -> tuple[float, float]:
+def _target(proof: FamilyProof) -> tuple[float, float]:
     """Return ``1 - t/T`` where the bound is judged, and what of the largest state it may leave there."""
-    sizes = map(abs, (*(certificate.initial_state or ()), *(certificate.sigma0 or ())))
-    return float(LAST) * certificate.settling_share, float(max(sizes) * LAST)
+    sizes = map(abs, (*(proof.initial_state or ()), *(proof.sigma0 or ())))
+    return float(LAST) * proof.settling_share, float(max(sizes) * LAST)
 
 
-def _usefulness_of_signal(certificate: FamilyContent) -> bool | None:
+def _usefulness_of_signal(proof: FamilyProof) -> bool | None:
     """Tell whether the bound leaves at most 1 % at 0.99 T; None where no state is approached by every signal."""
-    if not certificate.common:
+    if not proof.common:
         return None
-    if certificate.initial_state is not None:
-        instant, enough = _target(certificate)
-        return enough == 0 or bool(deviation_of_signal(certificate, [instant]).max() <= enough)
-    clock = float(certificate.protocol.gain.clock_at_remaining(float(LAST)))
-    for part in certificate.parts:
+    if proof.initial_state is not None:
+        instant, enough = _target(proof)
+        return enough == 0 or bool(deviation_of_signal(proof, [instant]).max() <= enough)
+    clock = float(proof.protocol.gain.clock_at_remaining(float(LAST)))
+    for part in proof.parts:
         left = [math.sqrt(V.overshoot) * math.exp(-float(V.rate) / 2 * clock) for V in part.functions]
         if part.component.nodes.size > 1 and min(left, default=math.inf) > float(LAST):
             return False

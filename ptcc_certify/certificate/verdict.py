@@ -17,10 +17,10 @@ from ptcc_certify.certificate.answer import (
     standing,
     verdict_of,
 )
-from ptcc_certify.certificate.certificate_data import Content
-from ptcc_certify.certificate.family_content import FamilyContent
-from ptcc_certify.certificate.judgements import judge, judge_family
-from ptcc_certify.certificate.usefulness import Use, use_of, use_of_family
+from ptcc_certify.certificate.evidence import Evidence
+from ptcc_certify.certificate.family_proof import FamilyProof
+from ptcc_certify.certificate.judgements import judge
+from ptcc_certify.certificate.usefulness import Use, use_of
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.errors import Change, Sentence
 from ptcc_certify.graphs.size_limits import EXACT_NODES
@@ -41,12 +41,12 @@ DECIDED_ALONE = (
 )
 
 
-def assess(certificate: Content | FamilyContent, report: CheckReport | None) -> Assessment:
+def assess(certificate: Evidence, report: CheckReport | None) -> Assessment:
     """Return the graded verdict of a certificate, and of what was expected of it.
 
     Parameters
     ----------
-    certificate : Certificate or FamilyCertificate
+    certificate : Evidence
     report : CheckReport or None
         What the independent check says of it; None if nothing was proved.
 
@@ -71,46 +71,37 @@ the input is not bounded; rho2=0.501 leaves 1 % and bounds the input
     ('refuted', 3)
     """
     verdict = verdict_of(report)
-    if isinstance(certificate, FamilyContent):
-        answers = list(judge_family(certificate))
-        use = (
-            use_of_family(certificate) if verdict == CERTIFIED else Use(None, _next_step_of_family(certificate, report))
-        )
-    else:
-        answers = list(judge(certificate))
-        use = use_of(certificate) if verdict == CERTIFIED else Use(None, _next_step(certificate, report))
+    proof = certificate.proof
+    answers = list(judge(proof))
+    use = use_of(proof) if verdict == CERTIFIED else Use(None, _next_step(certificate, report))
     violated = certificate.violated and not rejects(report)
     ignored = sorted({answer.what for answer in answers if answer.status == OPEN} & {"limits", "noise"})
-    ignored += ["disturbances"] if certificate.delta is not None else []
+    ignored += ["disturbances"] if proof.delta is not None else []
     without = f" without {' and '.join(ignored)}" if ignored else ""
     told = standing(answers, report)
     return Assessment(verdict, violated, use.useful, use.remark, use.advice, told, use.caveat, without)
 
 
-def _next_step_of_family(certificate: FamilyContent, report: CheckReport | None) -> str:
-    """Tell why nothing was decided of a family."""
-    if report is not None:
-        return rejection_text(report)
-    undecided = any(part.component.behaviour is None for part in certificate.parts)
-    return NEXT_STEP if undecided else DECIDED_ALONE
-
-
-def _next_step(certificate: Content, report: CheckReport | None) -> Sentence:
+def _next_step(certificate: Evidence, report: CheckReport | None) -> Sentence:
     """Tell why nothing was decided, and what to try."""
-    if report is not None and rejects(report):
+    proof = certificate.proof
+    if report is not None and (rejects(report) or isinstance(proof, FamilyProof)):
         return rejection_text(report)
-    method, notes, n = certificate.method, certificate.notes, certificate.graph.n_nodes
-    if certificate.rate is None:
-        if any(name not in NO_SEARCHES for name in certificate.cut_off):
-            share = f"no rate is proved, the search took its share of {certificate.time_limit:g} s; raise "
+    if isinstance(proof, FamilyProof):
+        undecided = any(part.component.behaviour is None for part in proof.parts)
+        return NEXT_STEP if undecided else DECIDED_ALONE
+    method, notes, n = proof.method, certificate.observed.notes, proof.graph.n_nodes
+    if proof.rate is None:
+        if any(name not in NO_SEARCHES for name in certificate.observed.cut_off):
+            share = f"no rate is proved, the search took its share of {proof.time_limit:g} s; raise "
             return share, Change("time_limit")
         if method != "best":
             return Change("method", method), " proves no rate; try ", Change("method", "best")
-        if (decades := certificate.graph.weight_decades) >= MANY_DECADES:
+        if (decades := proof.graph.weight_decades) >= MANY_DECADES:
             return f"no rate is proved, weights span {decades} decades: rescale them, or leave out the smallest"
         groups = [note for note in notes if "leader group" in note and "lmi is for" not in note]
         if groups:
-            most = max(len(component.nodes) for component in certificate.structure.closed_components)
+            most = max(len(component.nodes) for component in proof.structure.closed_components)
             return f"no rate is proved: a leader group of {most} nodes is too much; certify followers and leaders apart"
         mend = Change("method", "lmi") if n > EXACT_NODES else "rounding the weights to fewer digits"
         return "no rate is proved; try ", mend

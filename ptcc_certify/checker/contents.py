@@ -54,67 +54,68 @@ from ptcc_certify.checker.theorem_function import PaperSection
 
 
 @dataclass(frozen=True, kw_only=True)
-class GraphCertificate:
-    """A certificate of one graph."""
+class AnyCertificate:
+    """What certificates of one graph and of a family have alike."""
 
     schema: Literal["ptcc-certificate/2"]
     producer: str
-    graph: GraphSection
-    structure: StructureSection
-    claim: ClaimSection | None
-    components: Unread[Several[ComponentSection] | ManyComponents] | None = None
     protocol: NominalSection | SlidingSection
-    paper: PaperSection | None
-    lyapunov: FunctionsSection
-    rates: RatesSection
-    overshoot: OvershootSection | None
     initial_state: Agents | None
     sliding_variable: Agents | None
-    influence: InfluenceSection | None
-    final_state: Ends | None
     reaching_time: ReachingTimes | None
-    input: InputSection | None
     proof: list[Any]
-    verdict: Literal["certified", "undecided"]
     digest: Sha256
     unverified: dict[str, Any]
-    agents: AgentsSection | CascadeSection | None = None
     messages: MessagesSection | None = None
     leaders: LeadersSection | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class OfAgents:
+    """What a certificate of one graph says of agents of order n, and of formations."""
+
+    agents: AgentsSection | CascadeSection | None = None
     formation: FormationSection | None = None
     phases: Several[PhaseSection] | None = None
     instants: InstantsSection | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
-class FamilyCertificate:
+class GraphCertificate(OfAgents, AnyCertificate):
+    """A certificate of one graph."""
+
+    graph: GraphSection
+    structure: StructureSection
+    claim: ClaimSection | None
+    components: Unread[Several[ComponentSection] | ManyComponents] | None = None
+    paper: PaperSection | None
+    lyapunov: FunctionsSection
+    rates: RatesSection
+    overshoot: OvershootSection | None
+    influence: InfluenceSection | None
+    final_state: Ends | None
+    input: InputSection | None
+    verdict: Literal["certified", "undecided"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FamilyCertificate(AnyCertificate):
     """A certificate of a family of graphs."""
 
-    schema: Literal["ptcc-certificate/2"]
-    producer: str
     graph: FamilySection
     structure: ModeStructures
     claim: FamilyClaim | None
     components: Several[FamilyComponent] | None = None
-    protocol: NominalSection | SlidingSection
     paper: None
     lyapunov: FamilyFunctionsSection
     rates: None
     overshoot: None
-    initial_state: Agents | None
-    sliding_variable: Agents | None
     influence: None
     final_state: ByAgent[Ball | None] | None
-    reaching_time: ReachingTimes | None
     input: FamilyInput
-    proof: list[Any]
     verdict: Literal["certified"]
-    digest: Sha256
-    unverified: dict[str, Any]
     boxes: Several[AttractingBox | KeptBox] | None = None
     restricted: Several[Section] | None = None
-    messages: MessagesSection | None = None
-    leaders: LeadersSection | None = None
 
 
 #: What an obligation of each kind brings, if anything; where there are several, one of them, as its numbers tell.

@@ -98,7 +98,8 @@ def _certify_graph(
 ) -> int:
     """Certify what the protocol does on one graph."""
     from ptcc_certify.certificate.answer import rejects
-    from ptcc_certify.certificate.procedure import STEPS, certify_case
+    from ptcc_certify.certificate.graph_steps import STEPS
+    from ptcc_certify.certificate.procedure import certify_case
     from ptcc_certify.report.facts.of_certificate import facts_of
 
     LOG.info("%s", one_line(f"read {graph}: {signed.n_nodes} nodes, {signed.n_edges} edges"))

@@ -245,7 +245,7 @@ def certify_family(
 ) -> int:
     """Certify what the protocol does on a family, whatever the signal."""
     from ptcc_certify.certificate.answer import CERTIFIED
-    from ptcc_certify.certificate.family_certificate import STEPS
+    from ptcc_certify.certificate.family_steps import STEPS
     from ptcc_certify.certificate.procedure import certify_case
     from ptcc_certify.certificate.restricted_search import require_nominal
     from ptcc_certify.report.facts.of_certificate import facts_of

@@ -32,7 +32,6 @@ from ptcc_certify.model.initial_state import InitialState
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
-    from ptcc_certify.certificate.family_certificate import FamilyCertificate
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.model import Protocol
@@ -141,14 +140,12 @@ def plot(
     return ExitCode.OK
 
 
-def _of_certificate(
-    path: str, what: str | None, options: shared.Options
-) -> tuple[str, Certificate | FamilyCertificate]:
+def _of_certificate(path: str, what: str | None, options: shared.Options) -> tuple[str, Certificate]:
     """Read a certificate's file, and repeat its run if that is drawn; refuse options that are about a graph.
 
     Which figure comes first: ``what``, or the one that is drawn where none is named.
     """
-    from ptcc_certify.certificate.certificate import Certificate, read_certificate
+    from ptcc_certify.certificate.certificate import read_certificate
 
     context = click.get_current_context()
     for parameter in context.command.params:
@@ -159,7 +156,7 @@ def _of_certificate(
     with progress(("independent check", "simulation")) as begin:
         begin("independent check")
         certificate = read_certificate(path, memory=options["memory"])
-        agents = certificate.agents if isinstance(certificate, Certificate) else None
+        agents = certificate.agents
         of_agents = agents is not None
         if begins and (of_agents or certificate.initial_state is not None):
             mend = "certify agents of order n with it" if of_agents else f"the certificate {path} has its own"
@@ -173,15 +170,17 @@ def _of_certificate(
         if of_agents or what not in OF_A_RUN:
             return what, certificate
         if begins:
-            one = certificate.graph if isinstance(certificate, Certificate) else certificate.family.modes[0].mandatory
+            one = certificate.family.modes[0].mandatory if certificate.of_family else certificate.graph
             x0 = shared.read_initial_state(options["x0"], options["seed"], one)
-            if isinstance(certificate, Certificate) and certificate.offsets is not None:
+            if certificate.offsets is not None:
                 x0 = [x - h for x, h in zip(x0, certificate.offsets, strict=True)]
-            certificate = replace(certificate, initial_state=tuple(x0))  # to be drawn: what is proved holds for all
+            question = replace(certificate.question, initial_state=tuple(x0))
+            proof = replace(certificate.proof, question=question)  # to be drawn: what is proved holds for all
+            certificate = replace(certificate, proof=proof)
         elif certificate.initial_state is None:
             raise ParameterError(f"{path}: the certificate holds no initial state; give one with --x0")
         begin("simulation")
-        return what, certificate.with_simulation() if isinstance(certificate, Certificate) else certificate
+        return what, certificate if certificate.of_family else certificate.with_simulation()
 
 
 def _of_graphs(graphs: tuple[str, ...], what: str, options: shared.Options) -> Any:
@@ -192,9 +191,10 @@ def _of_graphs(graphs: tuple[str, ...], what: str, options: shared.Options) -> A
     return _of_family(given, what, options) if isinstance(given, Family) else _of_graph(given, what, options)
 
 
-def _of_family(family: Family, what: str, options: shared.Options) -> Family | FamilyCertificate:
+def _of_family(family: Family, what: str, options: shared.Options) -> Family | Certificate:
     """Return what the figure of a family is drawn from: itself, or its certificate."""
-    from ptcc_certify.certificate.family_certificate import STEPS, certify_family
+    from ptcc_certify.certificate.family_steps import STEPS
+    from ptcc_certify.certificate.procedure import certify_case
 
     refuse_options(options)
     if what in OF_AGENTS or agents_of(options) is not None:
@@ -210,14 +210,16 @@ def _of_family(family: Family, what: str, options: shared.Options) -> Family | F
         raise ParameterError(f"{what} is drawn from an initial state; give one with --x0")
     sigma0 = shared.sigma0_of(protocol, options, family.modes[0].mandatory)
     with progress(STEPS) as begin:
-        return certify_family(family, protocol, x0, sigma0=sigma0, time_limit=options["time_limit"], progress=begin)
+        asks = Asks(time_limit=options["time_limit"])
+        return certify_case(Case(family, protocol, InitialState(x0, sigma0), asks=asks), progress=begin)
 
 
 def _of_graph(
     signed: SignedDigraph, what: str, options: shared.Options
 ) -> Certificate | Trajectory | tuple[SignedDigraph, Any]:
     """Return what the figure of a graph is drawn from: itself, a run, or for its decay a certificate."""
-    from ptcc_certify.certificate.procedure import STEPS, certify_case
+    from ptcc_certify.certificate.graph_steps import STEPS
+    from ptcc_certify.certificate.procedure import certify_case
     from ptcc_certify.model.agents import Agents
 
     protocol = shared.protocol_of(options, () if what == "decay" else ("delta", "disturbance"))
@@ -248,7 +250,8 @@ def _of_graph(
 
 def _of_agents(signed: SignedDigraph, protocol: Protocol, what: str, options: shared.Options) -> Certificate:
     """Return what the figure of agents of order n is drawn from: a certificate of theirs."""
-    from ptcc_certify.certificate.procedure import STEPS, certify_case
+    from ptcc_certify.certificate.graph_steps import STEPS
+    from ptcc_certify.certificate.procedure import certify_case
 
     agents, initial = agents_and_states(options, signed)
     if initial is None:
@@ -266,13 +269,12 @@ def _of_agents(signed: SignedDigraph, protocol: Protocol, what: str, options: sh
 
 def _draw(what: str, subject: Any, wide: bool, time_unit: str) -> Any:
     """Draw a figure of a certificate, a run, a family, or a graph with its protocol."""
-    from ptcc_certify.certificate.family_certificate import FamilyCertificate
-    from ptcc_certify.graphs.family import Family
     from ptcc_certify.report.figures import plot as plot_of
+    from ptcc_certify.report.plots.subject import is_of_family
     from ptcc_certify.report.plots.trajectory import plot_run
     from ptcc_certify.simulation.trajectory import Trajectory
 
-    if isinstance(subject, Family | FamilyCertificate):
+    if is_of_family(subject):
         if wide:
             mend = "figures of families are one column wide: leave it out"
             raise ParameterError(f"--wide is for the states of one graph; {mend}")

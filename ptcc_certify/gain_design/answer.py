@@ -40,7 +40,7 @@ class TradeOff(NamedTuple):
 def refusal(certificate: Certificate) -> str:
     """Tell that the independent check does not accept a certificate, and why; empty if it does."""
     report = certificate.checked
-    if certificate.verdict == CERTIFIED:
+    if certificate.verdict == CERTIFIED or report is None:
         return ""
     if report.accepted:
         return "the independent check accepts it as undecided, not as certified"

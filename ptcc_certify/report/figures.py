@@ -12,9 +12,7 @@ from matplotlib.figure import Figure
 from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.certificate.answer import REFUTED
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.errors import ParameterError, SimulationError, gated, labelled
-from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, EXACT_NODES, INPUT_NODES
 from ptcc_certify.model.base import Protocol
 from ptcc_certify.report.notation import set_text
@@ -26,6 +24,7 @@ from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.input import plot_input
 from ptcc_certify.report.plots.spectrum import plot_spectrum
 from ptcc_certify.report.plots.style import figure_bytes
+from ptcc_certify.report.plots.subject import is_of_family
 from ptcc_certify.report.plots.tracking import plot_tracking
 from ptcc_certify.report.plots.trajectory import plot_sliding, plot_trajectory
 from ptcc_certify.simulation.agents import AgentsTrajectory
@@ -73,14 +72,14 @@ def plot(subject: Any, what: str, **keywords: Any) -> Any:
     """
     if what not in PLOTS:
         raise ParameterError("what", f"= {what!r} is unknown; one of {', '.join(PLOTS)}")
-    if what == "spectrum" and isinstance(subject, Family | FamilyCertificate):
+    if what == "spectrum" and is_of_family(subject):
         why = "eigenvalues of single graphs do not tell what switching among them does"
         raise ParameterError(f"{why}; draw those of one graph, or the decay of the family")
     return gated(PLOTS[what])(subject, **keywords)
 
 
 def draw(
-    saved: Certificate | FamilyCertificate,
+    saved: Certificate,
     wanted: Sequence[str] | None = None,
     runs: Sequence[Trajectory] = (),
     why: Counterexamples | None = None,
@@ -90,7 +89,7 @@ def draw(
 
     Parameters
     ----------
-    saved : Certificate or FamilyCertificate
+    saved : Certificate
         With a trajectory, for figures of it.
     wanted : sequence of str, optional
         All there are by default.
@@ -102,7 +101,7 @@ def draw(
         Of agents of order n.
     """
     wanted = tuple(PLOTS) if wanted is None else wanted
-    if isinstance(saved, FamilyCertificate):
+    if saved.of_family:
         return _draw_family(saved, wanted, runs, why or [])
     run, n = saved.trajectory, saved.graph.n_nodes
     there = {"graph": n <= DRAWN_NODES}
@@ -137,7 +136,7 @@ def run_of_agents(saved: Certificate) -> AgentsTrajectory | None:
 
 
 def _draw_family(
-    saved: FamilyCertificate, wanted: Sequence[str], runs: Sequence[Trajectory], why: Counterexamples
+    saved: Certificate, wanted: Sequence[str], runs: Sequence[Trajectory], why: Counterexamples
 ) -> dict[str, Any]:
     """Draw the graphs, runs within what is proved, and counterexamples: as far as there are any."""
     small = bool(runs) and saved.family.n_nodes <= INPUT_NODES
@@ -160,7 +159,7 @@ def _draw_family(
     return figures
 
 
-def counterexamples(saved: FamilyCertificate) -> Counterexamples:
+def counterexamples(saved: Certificate) -> Counterexamples:
     """Return what is refuted, the counterexample in words, its component, and itself: for claim and expectation."""
     result = []
     for part in saved.parts:

@@ -15,7 +15,6 @@ from typing import Any
 
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.facts import Fact
-from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.errors import PTCCError
 from ptcc_certify.gain_design.agents_answer import AgentsDesign
 from ptcc_certify.gain_design.answer import Design
@@ -61,8 +60,10 @@ def structure_html(structure: Structure) -> str:
 def certificate_html(certificate: Certificate) -> str:
     """Show a certificate: the screen of ``ptcc certify``, and the simulated decay under its proved bound.
 
-    Of one that was read, up to 120 nodes, the run is made for the figure.
+    Of one that was read, up to 120 nodes, the run is made for the figure; of a family that is a drawing of it.
     """
+    if certificate.of_family:
+        return _page(facts_of(certificate), *_family_figure(certificate.family))
     part, facts = certificate.agents, facts_of(certificate, "signed digraph", {})
     if part is not None:
         drawn = part.initial_state is not None and certificate.graph.n_nodes <= SHOWN_NODES
@@ -82,12 +83,6 @@ def _with_run(certificate: Certificate) -> Certificate:
         with suppress(PTCCError):
             return certificate.with_simulation(samples=201)
     return certificate
-
-
-@html_of.register(FamilyCertificate)
-def family_certificate_html(certificate: FamilyCertificate) -> str:
-    """Show the certificate of a family: the screen of ``ptcc certify``, and a drawing of up to 120 nodes."""
-    return _page(facts_of(certificate), *_family_figure(certificate.family))
 
 
 @html_of.register(Family)

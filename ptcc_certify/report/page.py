@@ -24,7 +24,6 @@ from markupsafe import Markup
 from lmi.exact.decimal_rounding import counted
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certificate_file import RejectedCertificate
-from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.family_comparison import compare
 from ptcc_certify.certificate.restricted_bounds import nearer_for_signal
 from ptcc_certify.checker import CheckReport
@@ -63,7 +62,7 @@ THEOREM = (
 
 
 def report_html(
-    saved: Certificate | FamilyCertificate,
+    saved: Certificate,
     *,
     no_run: str = "no run was asked for",
     runs: Sequence[Trajectory] = (),
@@ -75,7 +74,7 @@ def report_html(
 
     Parameters
     ----------
-    saved : Certificate or FamilyCertificate
+    saved : Certificate
         As :func:`ptcc_certify.certificate.certificate.read_certificate` reads it; with a trajectory
         (:meth:`Certificate.with_simulation`) there are figures of bound and input. One of a family may be undecided.
     no_run : str
@@ -99,10 +98,10 @@ def report_html(
     >>> "<h1>Signed-average consensus at T = 1</h1>" in page, "<bdi>&lt;b&gt;</bdi>" in page, "<b>" in page
     (True, True, False)
     """
-    why = counterexamples(saved) if isinstance(saved, FamilyCertificate) else []
+    why = counterexamples(saved) if saved.of_family else []
     report = saved.checked
-    run = run_of_agents(saved) if isinstance(saved, Certificate) else None
-    own = _of_family(saved, why) if isinstance(saved, FamilyCertificate) else _of_graph(saved)
+    run = run_of_agents(saved)
+    own = _of_family(saved, why) if saved.of_family else _of_graph(saved)
     view = _view(saved) | own | _runs(saved, runs, run)
     more: dict[str, Any] = {"no_run": no_run, "why": why, "obligations": [] if report is None else _obligations(report)}
     more["figures"] = draw(saved, None, runs, why, run)
@@ -177,14 +176,14 @@ def set_note(note: Sentence) -> Markup:
     return texts.set_text(spell(note, texts.as_parameters, marked=True))
 
 
-def _view(saved: Certificate | FamilyCertificate) -> dict[str, Any]:
+def _view(saved: Certificate) -> dict[str, Any]:
     """Return what the template shows of every certificate."""
     facts = facts_of(saved)
     source, assessment = saved.source, saved.assessment
     shown = [fact for fact in facts if fact.head not in (*_QUESTION, *_ELSEWHERE)]
     answers, details = ([fact for fact in shown if fact.detail == wanted] for wanted in (False, True))
     asked = [fact for fact in facts if fact.head in _QUESTION]
-    if isinstance(saved, Certificate):
+    if not saved.of_family:
         asked += leader_facts(saved.structure)
     pairs = zip(saved.labels, saved.sigma0 or (), saved.reaching or (), strict=False)
     advised = next((piece.number for piece in assessment.advice if isinstance(piece, Change)), "")
@@ -220,7 +219,7 @@ def _view(saved: Certificate | FamilyCertificate) -> dict[str, Any]:
     }
 
 
-def protocol_latex(saved: Certificate | FamilyCertificate) -> str:
+def protocol_latex(saved: Certificate) -> str:
     """Return the protocol in LaTeX: that of agents of order n, or with places in a formation."""
     if saved.agents is not None:
         return saved.agents.protocol.latex()
@@ -266,7 +265,7 @@ def _title(saved: Certificate) -> Markup:
     return text[:1].upper() + text[1:] if saved.verdict == "certified" else "Undecided: " + text
 
 
-def _of_family(saved: FamilyCertificate, why: Counterexamples) -> dict[str, Any]:
+def _of_family(saved: Certificate, why: Counterexamples) -> dict[str, Any]:
     """Return what the template shows of a family alone."""
     components = [part.component for part in saved.parts]
     depends, T = any(component.behaviour == DEPENDS for component in components), rational(saved.protocol.T)
@@ -285,7 +284,7 @@ def _of_family(saved: FamilyCertificate, why: Counterexamples) -> dict[str, Any]
         **{"family": saved.family, "several": len(saved.family.modes) > 1, "depends": depends, "why": why},
         **{"claims": claims, "claims_in_all": len(components), "heading": title, "title": title.striptags()},
         "promise": "" if saved.signal == "any" else signal_text(saved.signal)[1],
-        "promised": nearer_for_signal(saved) if saved.initial_state is not None else False,
+        "promised": nearer_for_signal(saved.family_proof) if saved.initial_state is not None else False,
         "bound_words": _bound_words(saved),
         "bound_kind": "" if bound is None else BOUND_KINDS[bound.kind],
         "unbounded": saved.unbounded and saved.common,
@@ -293,12 +292,10 @@ def _of_family(saved: FamilyCertificate, why: Counterexamples) -> dict[str, Any]
     }
 
 
-def _runs(
-    saved: Certificate | FamilyCertificate, runs: Sequence[Trajectory], run: AgentsTrajectory | None
-) -> dict[str, Any]:
+def _runs(saved: Certificate, runs: Sequence[Trajectory], run: AgentsTrajectory | None) -> dict[str, Any]:
     """Return what the template tells of simulated runs."""
     view: dict[str, Any] = {"runs": runs, "asked_run": False, "of_the_kind": False}
-    if isinstance(saved, FamilyCertificate):
+    if saved.of_family:
         if not runs:
             return view | {"run_text": ""}
         ratios = [compare(saved, run) for run in runs]
@@ -345,7 +342,7 @@ def _obligations(report: CheckReport) -> list[tuple[VerifiedObligation, list[Ver
     return [(same[0], same) for same in kinds.values()]
 
 
-def _bound_words(saved: FamilyCertificate) -> list[Markup]:
+def _bound_words(saved: Certificate) -> list[Markup]:
     """Tell the members that prove the upper bound on the rate: modes, weights, durations or shares."""
     parts = [part for part in saved.parts if part.upper_bound is not None]
     if not parts:
@@ -376,7 +373,7 @@ def _bound_words(saved: FamilyCertificate) -> list[Markup]:
     return lines
 
 
-def _commands(saved: Certificate | FamilyCertificate) -> list[str]:
+def _commands(saved: Certificate) -> list[str]:
     if saved.source is None:
         return []
     name = shlex.quote(PurePath(saved.source.path).name)

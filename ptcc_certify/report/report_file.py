@@ -11,7 +11,6 @@ from typing import Any
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.certificate_file import RejectedCertificate
 from ptcc_certify.certificate.checking import refuse_no_certificate
-from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.request import listener
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.io import write_atomically
@@ -29,7 +28,7 @@ SUFFIXES = (".html", ".htm", ".tex")
 
 
 def write_report(
-    certificate: str | Path | Mapping[str, Any] | Certificate | FamilyCertificate,
+    certificate: str | Path | Mapping[str, Any] | Certificate,
     output: str | Path,
     *,
     simulation: bool | None = None,
@@ -44,7 +43,7 @@ def write_report(
 
     Parameters
     ----------
-    certificate : path, mapping, Certificate or FamilyCertificate
+    certificate : path, mapping, Certificate
         A file of schema ``ptcc-certificate/2`` (``"-"``: standard input), its parsed JSON, or a certificate.
     output : path
         The suffix decides what is written.
@@ -87,7 +86,7 @@ def write_report(
     if suffix not in SUFFIXES:
         raise ParameterError(f"{output}: a report is written to .html or .tex; choose one of these")
     refuse_no_certificate(certificate)
-    in_memory = isinstance(certificate, Certificate | FamilyCertificate | Mapping)
+    in_memory = isinstance(certificate, Certificate | Mapping)
     file = None if in_memory or certificate == "-" else Path(certificate)  # type: ignore[arg-type]
     if file is not None and path.is_file() and file.is_file() and path.samefile(file):
         raise ParameterError(f"{output}: is the certificate itself; name another file")
@@ -104,43 +103,23 @@ def write_report(
             raise
         write_atomically(path, rejected_html(error, day=day))
         return "rejected"
-    progress("simulation")
-    if isinstance(saved, FamilyCertificate):
-        _write_family(saved, path, suffix, simulation, progress, day)
-        return saved.verdict
-    saved, why = _with_run(saved, simulation)
-    progress("report")
-    if suffix == ".tex":
-        _write_statement(path, draw(saved, ("graph", "decay")), lambda names: report_latex(saved, names))
-    else:
-        write_atomically(path, report_html(saved, no_run=why, day=day))
-    return saved.verdict
-
-
-def _read(certificate: Any, memory: float) -> Certificate | FamilyCertificate:
-    """Read a certificate back; that of a family of which nothing is certified has no file, and stays what it is."""
-    if isinstance(certificate, FamilyCertificate) and certificate.verdict != "certified":
-        return certificate
-    return read_certificate(certificate, memory=memory)
-
-
-def _write_family(
-    saved: FamilyCertificate,
-    path: Path,
-    suffix: str,
-    simulation: bool | None,
-    progress: Callable[[str], None],
-    day: date | None,
-) -> None:
-    """Write the page of a family's certificate, or its statement."""
     if suffix == ".tex" and saved.source is None:
         raise ParameterError("nothing is certified of this family, so that there is no statement; a page tells why")
-    runs, why = _runs(saved, simulation)
+    progress("simulation")
+    saved, runs, why = _with_runs(saved, simulation)
     progress("report")
     if suffix == ".tex":
         _write_statement(path, draw(saved, ("graph", "decay"), runs), lambda names: report_latex(saved, names))
     else:
         write_atomically(path, report_html(saved, runs=runs, no_run=why, day=day))
+    return saved.verdict
+
+
+def _read(certificate: Any, memory: float) -> Certificate:
+    """Read a certificate back; that of a family of which nothing is certified has no file, and stays what it is."""
+    if isinstance(certificate, Certificate) and certificate.of_family and certificate.verdict != "certified":
+        return certificate
+    return read_certificate(certificate, memory=memory)
 
 
 def _write_statement(path: Path, drawn: Mapping[str, Any], latex: Callable[[dict[str, str]], str]) -> None:
@@ -155,34 +134,24 @@ def _write_statement(path: Path, drawn: Mapping[str, Any], latex: Callable[[dict
     write_atomically(path, text)
 
 
-def _runs(saved: FamilyCertificate, simulation: bool | None) -> tuple[list[Trajectory], str]:
-    """Simulate a family under many signals, if there is an initial state; return why there is no run."""
+def _with_runs(saved: Certificate, simulation: bool | None) -> tuple[Certificate, list[Trajectory], str]:
+    """Repeat the run of one graph, or make runs of a family under many signals; return why there is none."""
+    n, of_family = len(saved.labels), saved.of_family
+    most, made = (INPUT_NODES, "made") if of_family else (REPEATED_NODES, "repeated")
     if simulation is False:
-        return [], "it was left out, as was asked"
+        return saved, [], "it was left out, as was asked"
     if saved.initial_state is None:
-        return [], "the certificate names no initial state"
-    if saved.late is not None or saved.leaders_move:
-        return [], "with late messages or leaders that move none is made of a family"
-    if simulation is None and saved.family.n_nodes > INPUT_NODES:
-        return [], f"above {INPUT_NODES} agents it is made only where that is asked for"
+        return saved, [], "the certificate names no initial state"
+    if of_family and (saved.late is not None or saved.leaders_move):
+        return saved, [], "with late messages or leaders that move none is made of a family"
+    if simulation is None and n > most:
+        return saved, [], f"above {most} agents it is {made} only where that is asked for"
     try:
-        return sample_runs(saved), ""
-    except (SimulationError, ParameterError, OverflowError) as error:
-        return [], f"it failed: {error}"
-
-
-def _with_run(saved: Certificate, simulation: bool | None) -> tuple[Certificate, str]:
-    """Repeat the run, if there is one to repeat; return why there is none."""
-    n = saved.graph.n_nodes
-    if simulation is False:
-        return saved, "it was left out, as was asked"
-    if saved.initial_state is None:
-        return saved, "the certificate names no initial state"
-    if simulation is None and n > REPEATED_NODES:
-        return saved, f"above {REPEATED_NODES} agents it is repeated only where that is asked for"
-    try:
-        return saved.with_simulation(samples=201 if n <= INPUT_NODES else 101), ""
+        if of_family:
+            return saved, sample_runs(saved), ""
+        return saved.with_simulation(samples=201 if n <= INPUT_NODES else 101), [], ""
     except (SimulationError, ParameterError) as error:
-        return saved, f"it failed: {error}"
-    except OverflowError:
-        return saved, "a number of the initial state is beyond the range of float64"
+        return saved, [], f"it failed: {error}"
+    except OverflowError as error:
+        beyond = "a number of the initial state is beyond the range of float64"
+        return saved, [], f"it failed: {error}" if of_family else beyond

@@ -16,7 +16,6 @@ from ptcc_certify.theorems.family_behaviour import DEPENDS
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
-    from ptcc_certify.certificate.family_certificate import FamilyCertificate
     from ptcc_certify.checker import CheckReport
 
 
@@ -63,7 +62,7 @@ def entries(facts: Iterable[Fact], name: Spelling = str, brief: bool = False) ->
 
 
 def summary_lines(
-    certificate: Certificate | FamilyCertificate,
+    certificate: Certificate,
     title: str | None = None,
     origins: Mapping[str, str] | None = None,
     name: Spelling = str,
@@ -72,7 +71,7 @@ def summary_lines(
 
     Parameters
     ----------
-    certificate : Certificate or FamilyCertificate
+    certificate : Certificate
     title : str, optional
         What the graph is called, unless as the certificate says.
     origins : mapping of str to str, optional
@@ -108,7 +107,7 @@ def summary_lines(
 
 
 def certificate_lines(
-    certificate: Certificate | FamilyCertificate,
+    certificate: Certificate,
     title: str | None = None,
     origins: Mapping[str, str] | None = None,
     name: Spelling = str,

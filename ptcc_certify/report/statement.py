@@ -16,7 +16,6 @@ import jinja2
 from markupsafe import Markup
 
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.restricted_claims import WindowClaim
 from ptcc_certify.certificate.restricted_states import states_of_signal
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -69,12 +68,12 @@ _MEANINGS = {
 }
 
 
-def report_latex(saved: Certificate | FamilyCertificate, figures: dict[str, str] | None = None) -> str:
+def report_latex(saved: Certificate, figures: dict[str, str] | None = None) -> str:
     r"""Return a certificate as a statement in LaTeX, to be read by ``\input``; it needs amsmath and graphicx.
 
     Parameters
     ----------
-    saved : Certificate or FamilyCertificate
+    saved : Certificate
         As :func:`ptcc_certify.certificate.certificate.read_certificate` reads it.
     figures : mapping of {"graph", "decay"} to str, optional
         Names of the files that are included.
@@ -96,7 +95,7 @@ def report_latex(saved: Certificate | FamilyCertificate, figures: dict[str, str]
     """
     assert saved.source is not None
     names = texts.parameter_names(saved.protocol)
-    own = _of_family(saved) if isinstance(saved, FamilyCertificate) else _of_graph(saved)
+    own = _of_family(saved) if saved.of_family else _of_graph(saved)
     told = [fact for fact in facts_of(saved) if fact.head not in _ELSEWHERE and not isinstance(fact.value, dict)]
     if saved.agents is not None:  # the rate of the graph alone, with which single integrators would decay
         told = [fact for fact in told if fact.head != "rate"]
@@ -136,7 +135,7 @@ def _of_graph(saved: Certificate) -> dict[str, Any]:
     }
 
 
-def _of_family(saved: FamilyCertificate) -> dict[str, Any]:
+def _of_family(saved: Certificate) -> dict[str, Any]:
     """Return what the template shows of a family alone."""
     family, components = saved.family, [part.component for part in saved.parts]
     parameters = [(mode, mode.parameters) for mode in family.modes]  # both directions of an undirected edge are one
@@ -156,7 +155,7 @@ def _of_family(saved: FamilyCertificate) -> dict[str, Any]:
     }
 
 
-def _left_by_windows(saved: FamilyCertificate) -> str:
+def _left_by_windows(saved: Certificate) -> str:
     """Return what joint windows leave less and less of, in symbols; nothing where no such claim is made."""
     claims = [claim for claim in saved.restricted if isinstance(claim, WindowClaim)]
     sizes = {STABILITY: r"$\max_{k} |x_{k}(t)|$"}
@@ -165,10 +164,10 @@ def _left_by_windows(saved: FamilyCertificate) -> str:
     return "; or ".join(dict.fromkeys(sizes.get(claim.behaviour, spread) + within for claim in claims))
 
 
-def _captions(saved: Certificate | FamilyCertificate) -> dict[str, str]:
+def _captions(saved: Certificate) -> dict[str, str]:
     """Return captions that say whether the bound is proved; through a reaching phase it is integrated in floats."""
     bound = "proved bound" if saved.direct else "bound (numerical)"
-    if not isinstance(saved, FamilyCertificate):
+    if not saved.of_family:
         decay = f"What is left of the error against the time left, both logarithmic. Thick line: the {bound} from the"
         decay += " initial state of the table, the least of those of the Lyapunov functions, which are the thin lines;"
         decay += f" dashed: that of the theorem's own. With circles: a simulated run (numerical), {_DOWN_TO}"
@@ -272,7 +271,7 @@ def _states(saved: Certificate) -> tuple[list[str], list[tuple[str, ...]]]:
     return list(numbers), list(zip(labels, parts, *map(_in_math, numbers.values()), strict=False))
 
 
-def _family_states(saved: FamilyCertificate) -> tuple[list[str], list[tuple[str, ...]]]:
+def _family_states(saved: Certificate) -> tuple[list[str], list[tuple[str, ...]]]:
     """Return heads and rows of the table of camps, initial and final states."""
     rows = state_rows(saved)[: texts.LISTED]
     if not rows:
@@ -283,7 +282,7 @@ def _family_states(saved: FamilyCertificate) -> tuple[list[str], list[tuple[str,
     if not saved.direct:
         columns[r"$\sigma_{k}(0)$"] = _in_math(map(texts.rational, (saved.sigma0 or ())[: texts.LISTED]))
     if any(end is not None for end in ends):
-        restricted = states_of_signal(saved) != list(saved.final_states or ())
+        restricted = states_of_signal(saved.family_proof) != list(saved.final_state or ())
         head = "at the deadline, restricted" if restricted else "at the deadline"
         columns[head] = ["no limit claimed" if end is None else _in_math([end])[0] for end in ends]
     return list(columns), list(zip(map(latex_of_text, map(_cut, labels)), *columns.values(), strict=True))

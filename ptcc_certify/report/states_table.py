@@ -11,7 +11,6 @@ from markupsafe import Markup
 from lmi.exact.decimal_rounding import counted
 from ptcc_certify.bounds.final_state import extremes
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.restricted_states import states_of_signal
 from ptcc_certify.report import notation as texts
 from ptcc_certify.report.facts.claim import assumptions
@@ -23,9 +22,9 @@ from ptcc_certify.theorems.family_claims import camps
 ROWS, EXTREMES = 60, 10
 
 
-def states_table(saved: Certificate | FamilyCertificate) -> tuple[str, list[Any], list[str]]:
+def states_table(saved: Certificate) -> tuple[str, list[Any], list[str]]:
     """Return caption, rows and heads of the table of initial and final states: of all agents, or of the extremes."""
-    if isinstance(saved, FamilyCertificate):
+    if saved.of_family:
         return _of_family(saved)
     columns = _of_agents(saved) if saved.agents is not None else _of_graph(saved)
     if not columns:
@@ -47,7 +46,7 @@ def states_table(saved: Certificate | FamilyCertificate) -> tuple[str, list[Any]
     return caption, list(zip(names, *columns.values(), strict=True)), ["Agent", *columns]
 
 
-def _assumed(saved: Certificate | FamilyCertificate) -> str:
+def _assumed(saved: Certificate) -> str:
     """Tell what final states are without, where more was asked."""
     return "".join(f", {text}" for text in assumptions(saved))
 
@@ -99,12 +98,12 @@ def _vector(numbers: Sequence[float]) -> str:
     return told[0] if len(told) == 1 else f"({', '.join(told)})"
 
 
-def _of_family(saved: FamilyCertificate) -> tuple[str, list[Any], list[str]]:
-    rows, finals = state_rows(saved)[:ROWS], states_of_signal(saved)
+def _of_family(saved: Certificate) -> tuple[str, list[Any], list[str]]:
+    rows, finals = state_rows(saved)[:ROWS], states_of_signal(saved.family_proof)
     heads = ["Agent", "Camp", "Initial state"]
     if all(last is None for *_, last in rows):
         return "Where the agents begin", [(texts.label(name), *cells) for name, *cells, _ in rows], heads
-    every = finals == list(saved.final_states or ())
+    every = finals == list(saved.final_state or ())
     which = "every signal" if every else "these signals"
     which += "" if saved.protocol.reaching is None else " and disturbance"
     last = "State at the deadline" if rests(saved) else "State at any instant"
@@ -113,11 +112,11 @@ def _of_family(saved: FamilyCertificate) -> tuple[str, list[Any], list[str]]:
     return caption, written, [*heads, f"{last}{agreement_text(saved)}, for {which}"]
 
 
-def state_rows(saved: FamilyCertificate) -> list[tuple[str, str, str, str | None]]:
+def state_rows(saved: Certificate) -> list[tuple[str, str, str, str | None]]:
     """Return label, camp, initial and final state of every agent; None where no limit is claimed."""
     if saved.initial_state is None:
         return []
-    labels, finals = saved.family.labels, states_of_signal(saved)
+    labels, finals = saved.family.labels, states_of_signal(saved.family_proof)
     camp = ["\u2013"] * len(labels)
     for part in saved.parts:
         for number, side in enumerate(camps(part.component), 1):

@@ -49,8 +49,8 @@ def proved_forms(cert: Certificate) -> list[tuple[Fraction, Callable[[list[flint
     """Rate and ``V`` of every member, the paper's in its own coordinates."""
     graph, gauge = cert.graph, cert.structure.gauge
     forms = []
-    if (V := cert.lyapunov) is not None and V.blocks and cert.proof.rate is not None:
-        forms.append((cert.proof.rate, lambda X: value(graph, V, gauge, X)))
+    if (V := cert.lyapunov) is not None and V.blocks and cert.paper_rate is not None:
+        forms.append((cert.paper_rate, lambda X: value(graph, V, gauge, X)))
     for m in cert.search.functions:
         forms.append((m.rate, lambda X, m=m: form_value(graph, m.nodes, m.weights or None, m.matrix, X)))
     return forms
@@ -157,7 +157,7 @@ def test_vector_valued_agents():
     graph = random_graph(rng, **dict(all_classes())["3.1 mixed"]).graph
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
     cert = certify(graph, protocol)
-    assert cert.lyapunov is not None and cert.proof.rate is not None
+    assert cert.lyapunov is not None and cert.paper_rate is not None
     drawn = [[Fraction(int(v), 100) for v in rng.integers(-1000, 1001, graph.n_nodes)] for _ in range(3)]
     run = simulate(graph, protocol, np.array([[float(x) for x in column] for column in zip(*drawn, strict=True)]))
     seen = cert.envelope.compare(run)
@@ -171,7 +171,7 @@ def test_vector_valued_agents():
         columns = [states(graph, s, x0) for x0 in drawn]
         total = sum((value(graph, cert.lyapunov, None, X) for X in columns), flint.arb(0))
         start = sum((value(graph, cert.lyapunov, None, [ball(x) for x in x0]) for x0 in drawn), flint.arb(0))
-        assert total < (-ball(cert.proof.rate) * s).exp() * start
+        assert total < (-ball(cert.paper_rate) * s).exp() * start
         if abs(run.remaining[at] - float(q)) < 1e-12:
             exact = np.array([[float(x) for x in X] for X in columns]).T
             assert np.abs(run.states[:, :, at] - exact).max() <= 1e-7 * 10

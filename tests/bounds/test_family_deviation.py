@@ -7,11 +7,11 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from asked import certify_family
 from scipy.linalg import expm
 
 from ptcc_certify import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.certificate.family_certificate import certify_family
-from ptcc_certify.certificate.family_content import ComponentProof
+from ptcc_certify.certificate.family_proof import ComponentProof
 from ptcc_certify.graphs.family import Family
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
@@ -132,7 +132,7 @@ def test_once_no_sliding_variable_moves_deviations_are_told_by_coordinates(sigma
     certificate = certify_family(Family.from_intervals(edges), protocol, [3, -1, 4, 1, -5], sigma0=sigma)
     (part,) = certificate.parts
     early, late = (certificate.deviation_bound([q]) for q in (0.9, 0.1))
-    coarse = replace(certificate, parts=(_without_rest(part),))
+    coarse = certificate.changed(parts=(_without_rest(part),))
     assert (early == coarse.deviation_bound([0.9])).all() and (late < coarse.deviation_bound([0.1]))[3:].all()
 
 

@@ -9,12 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asked import certify_family, family_certificate
 from row_families import laplacian, random_interval, random_led, random_vertex
 from scipy.linalg import expm
 
 from ptcc_certify import NominalProtocol
 from ptcc_certify.bounds.kept_means import leading_groups
-from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate, certify_family
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.family_proof import ComponentProof
 from ptcc_certify.checker import check, digest
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.family_function import FamilyFunction
@@ -68,9 +70,9 @@ def end_of_a_signal(rng: random.Random, family: Family, x: list[Fraction]) -> np
     return np.linalg.matrix_power(step, 100_000) @ X
 
 
-def plain(family: Family, x: list[Fraction]) -> FamilyCertificate:
+def plain(family: Family, x: list[Fraction]) -> Certificate:
     """A certificate without any Lyapunov function."""
-    return FamilyCertificate(family, PROTOCOL, tuple(map(ComponentProof, decide(family))), tuple(x))
+    return family_certificate(family, PROTOCOL, tuple(map(ComponentProof, decide(family))), tuple(x))
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -84,7 +86,7 @@ def test_every_signal_keeps_the_mean_of_a_circulation(seed: int):
     x = [Fraction(rng.randint(-20, 20), 3) for _ in range(family.n_nodes)]
     certificate = plain(family, x)
     assert certificate.checked is not None and certificate.checked.accepted, certificate.checked
-    ends = certificate.final_states
+    ends = certificate.final_state
     assert ends is not None and all(low == high for low, high in filter(None, ends))
     X = end_of_a_signal(rng, family, x)
     assert np.allclose(X, [float(low) for low, _ in filter(None, ends)], atol=1e-6)
@@ -98,7 +100,7 @@ def test_undirected_graphs_end_at_the_mean_whatever_the_signal(seed: int):
     certificate = plain(family, x)
     g = [int(v) for v in certificate.parts[0].component.gauge]
     mean = sum(a * b for a, b in zip(g, x, strict=True)) / len(x)
-    assert certificate.final_states == tuple((a * mean, a * mean) for a in g)
+    assert certificate.final_state == tuple((a * mean, a * mean) for a in g)
     assert certificate.checked is not None and certificate.checked.accepted
     assert np.allclose(end_of_a_signal(rng, family, x), [float(a * mean) for a in g], atol=1e-6)
 
@@ -123,7 +125,7 @@ def test_followers_of_several_groups_end_between_combinations_of_these(seed: int
     x = [Fraction(rng.randint(-20, 20)) for _ in range(family.n_nodes)]
     certificate = plain(family, x)
     assert certificate.checked is not None and certificate.checked.accepted, certificate.checked
-    ends = certificate.final_states
+    ends = certificate.final_state
     assert ends is not None and None not in ends
     for _ in range(3):
         X = end_of_a_signal(rng, family, x)
@@ -137,7 +139,7 @@ def test_followers_of_leaders_that_keep_their_values_end_at_a_point():
     family = Family.switching([Family.from_intervals(day), Family.from_intervals(night)])
     certificate = certify_family(family, PROTOCOL, [1, 5, 99, -99, 0])
     assert certificate.verdict == "certified"
-    assert certificate.final_states == tuple((Fraction(v),) * 2 for v in (1, 5, 4, 4, Fraction(-5, 2)))
+    assert certificate.final_state == tuple((Fraction(v),) * 2 for v in (1, 5, 4, 4, Fraction(-5, 2)))
 
 
 def test_weights_known_to_a_part_leave_the_mean_nearly_kept():
@@ -147,10 +149,10 @@ def test_weights_known_to_a_part_leave_the_mean_nearly_kept():
     family = Family.from_intervals([(s, t, low * Fraction(19, 20), low * Fraction(21, 20)) for s, t, low, _ in cycle])
     x = [Fraction(v) for v in (5, -3, 8, 0, -9)]
     certificate = certify_family(family, PROTOCOL, x)
-    bare = replace(certificate, parts=tuple(replace(p, functions=stripped(p)) for p in certificate.parts))
+    bare = certificate.changed(parts=tuple(replace(p, functions=stripped(p)) for p in certificate.parts))
     assert certificate.verdict == bare.verdict == "certified"
-    assert certificate.final_states is not None and bare.final_states is not None
-    (low, high), (before, after) = (ends for c in (certificate, bare) if (ends := c.final_states[0]) is not None)
+    assert certificate.final_state is not None and bare.final_state is not None
+    (low, high), (before, after) = (ends for c in (certificate, bare) if (ends := c.final_state[0]) is not None)
     assert before <= low < high <= after and high - low < (after - before) / 2
     for _ in range(5):
         assert low - 1e-6 <= end_of_a_signal(rng, family, x)[0] <= high + 1e-6

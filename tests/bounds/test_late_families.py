@@ -13,7 +13,7 @@ import pytest
 from led_families import led_family
 
 import ptcc_certify as ptcc
-from ptcc_certify.certificate.family_certificate import FamilyCertificate
+from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.checker.reading import digest
@@ -59,7 +59,7 @@ def ages_of(family: Family, messages: LateMessages | None) -> dict[tuple[int, in
     return {pair: float(x + messages.held) for pair, x in zip(pairs, each, strict=True)}
 
 
-def worst_ratio(certificate: FamilyCertificate, rng: np.random.Generator) -> tuple[float, float]:
+def worst_ratio(certificate: Certificate, rng: np.random.Generator) -> tuple[float, float]:
     """Seen over certified, distance to the target and input, of a motion that is chosen against the followers.
 
     Mode, weights, ages, errors, leaders and disturbances are held over a step, ages so that they stay within the
@@ -126,7 +126,7 @@ def worst_ratio(certificate: FamilyCertificate, rng: np.random.Generator) -> tup
 
 
 def _fresh_step(
-    certificate: FamilyCertificate,
+    certificate: Certificate,
     edges: list[tuple[int, int, int, float, float]],
     sides: dict[int, float],
     x: np.ndarray,
@@ -167,7 +167,7 @@ def _rows(
     return D, heard
 
 
-def random_case(seed: int, by_edge: bool = False) -> FamilyCertificate:
+def random_case(seed: int, by_edge: bool = False) -> Certificate:
     rng = np.random.default_rng(seed)
     family = led_family(rng, 1 + seed % 3, 2 + seed % 5, 1 + seed % 3, common=seed % 3 == 1)
     x0 = [int(x) for x in rng.integers(-9, 10, family.n_nodes)]

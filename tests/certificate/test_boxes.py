@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asked import certify_family
 from mutations import changed, leaves, of_leaf, resealed
 from oracle_family_certificates import false_family_claims
 from row_families import laplacian, random_followers, vertices
@@ -17,8 +18,7 @@ from selection import thinned
 
 from ptcc_certify import Family, NominalProtocol, SlidingModeProtocol
 from ptcc_certify.bounds.attracting_box import box_of_family
-from ptcc_certify.certificate.certificate import read_certificate
-from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
+from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.checker import check
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.screen import certificate_lines, summary_lines
@@ -29,12 +29,12 @@ GAINS = {"T_r": 1, "T_s": 1, "rho1": 1, "rho2": 1, "kappa": 3, "mu1": 2, "mu2": 
 MOVED = Family.from_intervals([("a", "c", 1, 3), ("b", "c", 1, 1), ("c", "d", 1, 2), ("a", "d", -1, 0)], nodes="abcd")
 
 
-def made(family: Family, x0: Any, protocol: Any = PROTOCOL, **more: Any) -> FamilyCertificate:
+def made(family: Family, x0: Any, protocol: Any = PROTOCOL, **more: Any) -> Certificate:
     return certify_family(family, protocol, x0, time_limit=3, **more)
 
 
 @cache
-def moved() -> FamilyCertificate:
+def moved() -> Certificate:
     return made(MOVED, [0, 4, 100, 3])
 
 
@@ -105,7 +105,7 @@ def test_what_is_read_back_says_the_same():
     again = read_certificate(certificate.to_dict())
     assert again == certificate and certificate_lines(again, "f")[2:] == certificate_lines(certificate, "f")[2:]
     assert again.boxes[0].excess([0, 4, 100, 3]) == certificate.boxes[0].excess([0, 4, 100, 3]) > 0
-    assert certificate.final_states == (None,) * 4
+    assert certificate.final_state == (None,) * 4
 
 
 def test_screen_page_and_statement_tell_the_box_and_claim_no_limit():

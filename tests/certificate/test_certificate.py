@@ -26,7 +26,7 @@ from selection import thinned
 
 from lmi.exact.decimal_rounding import float_up
 from ptcc_certify.batch import certify_many
-from ptcc_certify.certificate import procedure
+from ptcc_certify.certificate import graph_steps
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.graph_sections import structure_document
 from ptcc_certify.certificate.procedure import certify
@@ -445,7 +445,7 @@ def test_the_recheck_sees_what_is_wrong_with_the_limit_of_rates(name: str):
 
 def test_only_what_the_independent_check_accepts_is_certified(monkeypatch: pytest.MonkeyPatch):
     """A search or a proof that is wrong leaves the verdict undecided, and the step is named."""
-    graph, search = load_graph("fig3a"), procedure._search_and_prove
+    graph, search = load_graph("fig3a"), graph_steps._search_and_prove
     assert certify(graph, PROTOCOL, asks=Asks(simulation=False, method="paper")).verdict == "certified"
 
     def too_fast(*args: Any) -> Any:
@@ -458,7 +458,7 @@ def test_only_what_the_independent_check_accepts_is_certified(monkeypatch: pytes
         ]
         return V, replace(proof, rate=proof.rate * more, obligations=tuple(steps)), numerical
 
-    monkeypatch.setattr(procedure, "_search_and_prove", too_fast)
+    monkeypatch.setattr(graph_steps, "_search_and_prove", too_fast)
     cert = certify(graph, PROTOCOL, asks=Asks(simulation=False, method="paper"))
     assert cert.verdict == cert.to_dict()["verdict"] == "undecided"
     assert not cert.checked.accepted and cert.checked.rejected == "margin of paper"
@@ -852,7 +852,7 @@ def test_a_method_keeps_to_its_class(name: str, kwargs: dict):
         assert data["unverified"]["search"]["method"] == method
         assert cert.rate is not None and cert.spectral_rate is not None
         assert cert.rate <= cert.spectral_rate * (1 + 1e-6)
-        assert data["rates"]["paper"] == str(cert.proof.rate)
+        assert data["rates"]["paper"] == str(cert.paper_rate)
         assert (data["rates"]["diagonal"] is None) == (beside & {"perron", "lmi"} == set())
         rates[method] = float(cert.rate)
     assert rates["paper"] <= min(rates.values()) * (1 + 1e-9)

@@ -10,14 +10,14 @@ from functools import cache
 from typing import Any
 
 import pytest
+from asked import certify_family
 from mutations import changed, leaves, resealed
 from row_families import random_consensus, random_state, values_of_vertices
 
 from lmi import search_time
 from ptcc_certify import Family, NominalProtocol, SlidingModeProtocol
 from ptcc_certify.bounds.family_final_state import value_ends
-from ptcc_certify.certificate.certificate import read_certificate
-from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
+from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.restricted_claims import FinalValueClaim
 from ptcc_certify.certificate.restricted_states import constant_states
 from ptcc_certify.checker import check
@@ -30,16 +30,16 @@ GAINS = {"T_r": 1, "T_s": 1, "rho1": 1, "rho2": 1, "kappa": 3, "mu1": 2, "mu2": 
 PAIR = [("a", "b", -2, -1), ("b", "a", -1, -1), ("b", "c", 5, 9)]
 
 
-def made(family: Family, x0: Any, protocol: Any = PROTOCOL, **more: Any) -> FamilyCertificate:
+def made(family: Family, x0: Any, protocol: Any = PROTOCOL, **more: Any) -> Certificate:
     return certify_family(family, protocol, x0, signal="constant", time_limit=3, **more)
 
 
 @cache
-def pair() -> FamilyCertificate:
+def pair() -> Certificate:
     return made(Family.from_intervals(PAIR), [0, 6, 100])
 
 
-def claim_of(certificate: FamilyCertificate) -> FinalValueClaim:
+def claim_of(certificate: Certificate) -> FinalValueClaim:
     (claim,) = certificate.final_values.values()
     return claim
 
@@ -51,12 +51,12 @@ def compare(seed: int) -> int:
     certificate = made(family, x)
     assert certificate.verdict == "certified" and check(certificate.to_dict(), stdlib=True).accepted
     if not certificate.final_values:
-        assert family.n_nodes == 1 or certificate.final_states[0][0] == certificate.final_states[0][1]
+        assert family.n_nodes == 1 or certificate.final_state[0][0] == certificate.final_state[0][1]
         return 0
     (ends,) = claim_of(certificate).values
     values = values_of_vertices(family.modes[0], [g * y for g, y in zip(ends.camps, x, strict=True)])
     assert (ends.lower, ends.upper, ends.within) == (min(values), max(values), 0)
-    for (low, high), (wide_low, wide_high) in zip(ends.final_states, certificate.final_states, strict=True):
+    for (low, high), (wide_low, wide_high) in zip(ends.final_states, certificate.final_state, strict=True):
         assert wide_low <= high and low <= wide_high
     return 1
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from asked import certify_family, family_certificate
 from cpu_time import at_most
 
 from lmi.common import evaluate
 from lmi.exact.work import WorkError, limited
 from ptcc_certify import NominalProtocol
-from ptcc_certify.certificate import family_certificate
-from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate, certify_family
+from ptcc_certify.certificate import family_steps
+from ptcc_certify.certificate.family_proof import ComponentProof
 from ptcc_certify.checker import family_function
 from ptcc_certify.checker.matrix_products import WITH_MULTIPLIERS, need_rows_with_multipliers
 from ptcc_certify.checker.reading import RejectedError
@@ -45,7 +46,7 @@ def test_what_is_decided_on_edges_alone_is_told_and_not_certified():
     assert (
         certificate.assessment.exit_code == 4 and "decided on edges, and not certified" in certificate.assessment.text
     )
-    assert certificate.final_states == (None,) * 302
+    assert certificate.final_state == (None,) * 302
     text = "\n".join(
         [*summary_lines(certificate, "net"), *certificate_lines(certificate, "net"), str(certificate.to_dict())]
     )
@@ -96,7 +97,7 @@ def test_a_proof_of_441_rows_is_taken():
     found = evaluate(np.eye(21), [quotient.modes[0].array], [np.full(420, 0.02)])
     function = prove_certificate(quotient, "diagonal", found, [0])
     assert function is not None and function.rate > 1.8 and quotient.modes[0].proof_rows == 441
-    made = FamilyCertificate(family, PROTOCOL, (ComponentProof(component, (function,)),))
+    made = family_certificate(family, PROTOCOL, (ComponentProof(component, (function,)),))
     assert made.verdict == "certified" and made.rate == function.rate
 
 
@@ -114,7 +115,7 @@ def _three_uncertain_edges() -> Family:
 def test_no_function_is_searched_whose_proof_has_more_rows_than_the_check_takes(monkeypatch):
     """3 agents and 3 uncertain edges."""
     monkeypatch.setattr(family_search, "WITH_MULTIPLIERS", 5)
-    monkeypatch.setattr(family_certificate, "squares_function", lambda *_: None)
+    monkeypatch.setattr(family_steps, "squares_function", lambda *_: None)
     made = certify_family(_three_uncertain_edges(), PROTOCOL, [1, 2, 3])
     assert made.verdict == "certified" and made.rate is None
     text = " ".join("\n".join(summary_lines(made, "net")).split())
@@ -130,7 +131,7 @@ def test_functions_that_the_check_refuses_are_left_out(monkeypatch):
         raise RejectedError("too many rows")
 
     monkeypatch.setattr(family_function, "need_rows_with_multipliers", refuse)
-    monkeypatch.setattr(family_certificate, "LARGEST_ROWS", 5)
+    monkeypatch.setattr(family_steps, "LARGEST_ROWS", 5)
     made = certify_family(_three_uncertain_edges(), PROTOCOL, [1, 2, 3])
     assert made.verdict == "certified" and made.rate is None and made.parts[0].functions == ()
     assert made.notes[-1] == "the independent check does not take all functions that were found: too many rows"

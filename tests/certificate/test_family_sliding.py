@@ -8,14 +8,15 @@ from itertools import product
 
 import numpy as np
 import pytest
+from asked import certify_family, family_certificate
 from common_kernel_families import KINDS, random_family
 from row_families import laplacian, random_led, random_vertex
 from scipy.integrate import quad
 from selection import thinned
 
 from ptcc_certify.certificate.certificate import read_certificate
-from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate, certify_family
 from ptcc_certify.certificate.family_comparison import compare, functions_of, worst_case_signals
+from ptcc_certify.certificate.family_proof import ComponentProof
 from ptcc_certify.checker import check, digest
 from ptcc_certify.checker.family_sliding import Drive, drive_sizes
 from ptcc_certify.checker.input_formulas import root_above
@@ -262,9 +263,9 @@ def test_without_sliding_variables_all_is_as_without_disturbances(kind):
     nominal = certify_family(family, NominalProtocol(T=2, rho1=1, rho2=1, kappa=3), x0, time_limit=60)
     zero = (Fraction(0),) * 3  # with the same functions, whatever the searches had time for
     reaching = certified_reaching_times(PROTOCOL, zero)
-    own = FamilyCertificate(family, PROTOCOL, nominal.parts, nominal.initial_state, zero, reaching)
+    own = family_certificate(family, PROTOCOL, nominal.parts, nominal.initial_state, zero, reaching)
     assert own.direct and own.drives is None and own.verdict == "certified"
-    assert own.final_states == nominal.final_states and own.nominal_peaks == nominal.input_peaks
+    assert own.final_state == nominal.final_state and own.nominal_peaks == nominal.input_peaks
     if own.input_peaks is not None:
         assert all(x - y == PROTOCOL.mu1 for x, y in zip(own.input_peaks, nominal.input_peaks, strict=True))
     q = np.geomspace(1, 1e-6, 9)
@@ -299,7 +300,7 @@ def test_functions_of_rows_are_driven_too(kind):
     x0 = tuple(Fraction(int(x)) for x in rng.integers(-5, 6, n))
     sigma0 = tuple(Fraction(int(x), 4) for x in rng.integers(-5, 6, n))
     reaching = certified_reaching_times(PROTOCOL, sigma0)
-    certificate = FamilyCertificate(family, PROTOCOL, parts, x0, sigma0, reaching)
+    certificate = family_certificate(family, PROTOCOL, parts, x0, sigma0, reaching)
     assert certificate.checked.accepted, certificate.checked
     more = {"sigma0": sigma0, "samples": 25, "past": 0, "remaining": 1e-3}
     for signal in (RandomSignal(1, 2.0), ConstantSignal(0, 0.0), ConstantSignal(0, 1.0)):

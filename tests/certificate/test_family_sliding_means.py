@@ -6,10 +6,10 @@ from functools import cache
 
 import numpy as np
 import pytest
+from asked import certify_family
 from common_kernel_families import random_family
 
 from ptcc_certify.certificate.certificate import read_certificate
-from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.certificate.family_comparison import compare
 from ptcc_certify.checker import check, digest
 from ptcc_certify.errors import ParameterError
@@ -44,10 +44,10 @@ def test_means_that_every_signal_keeps_are_those_of_x_minus_sigma():
     x0, sigma0 = [3, 1, 2], ["1", "-2", "1/2"]
     certificate = certify_family(PATH, PROTOCOL, x0, sigma0=sigma0, time_limit=60)
     mean = Fraction(2 + 3, 3) - Fraction(3, 2) / 3
-    assert certificate.final_states == ((mean, mean), (mean, mean), (-mean, -mean))
+    assert certificate.final_state == ((mean, mean), (mean, mean), (-mean, -mean))
     assert certificate.checked.accepted
     for run in runs(certificate):
-        assert np.allclose(run.final_state, [float(low) for low, _ in certificate.final_states], atol=1e-5)
+        assert np.allclose(run.final_state, [float(low) for low, _ in certificate.final_state], atol=1e-5)
         assert not compare(certificate, run).violated
 
 
@@ -77,7 +77,7 @@ def test_narrower_ends_than_sliding_variables_leave_are_refused():
     data = certificate.to_dict()
     assert check(data).accepted
     y = [Fraction(5) - 9, Fraction(6) - 8]
-    assert certificate.final_states[0][1] > max(y)
+    assert certificate.final_state[0][1] > max(y)
     ends = {"mid": str((y[0] + y[1]) / 2), "radius": str((y[1] - y[0]) / 2)}
     data["final_state"] = dict.fromkeys(data["final_state"], ends)
     assert not check(data | {"digest": digest(data)}).accepted

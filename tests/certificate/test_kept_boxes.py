@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asked import certify_family
 from families import random_family
 from mutations import resealed
 from oracle_family_certificates import false_family_claims
@@ -18,8 +19,7 @@ from scipy.linalg import expm
 from selection import thinned
 
 from ptcc_certify import Family, NominalProtocol, SlidingModeProtocol
-from ptcc_certify.certificate.certificate import read_certificate
-from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
+from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.checker import check
 from ptcc_certify.model.restricted_signals import DwellTime
 from ptcc_certify.report.page import report_html
@@ -33,7 +33,7 @@ NIGHT = Family.from_intervals([("b", "a", 1, 1), ("d", "c", "1/2", 1)], nodes="a
 MOVED, X0 = Family.switching([DAY, NIGHT]), [1, 2, 0, 5]
 
 
-def made(family: Family, x0: Any, **more: Any) -> FamilyCertificate:
+def made(family: Family, x0: Any, **more: Any) -> Certificate:
     return certify_family(family, more.pop("protocol", PROTOCOL), x0, time_limit=3, **more)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from asked import certify_words
+from asked import certify_family, certify_words
 from bad_inputs import ptcc
 from late_certificates import led_graph
 from selection import thinned
@@ -31,7 +31,6 @@ from ptcc_certify.bounds.missed_deadline import Missed
 from ptcc_certify.certificate import document
 from ptcc_certify.certificate.answer import Answer, standing
 from ptcc_certify.certificate.certificate_file import RejectedCertificate
-from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.final_state import WIDEST
 from ptcc_certify.graphs.structure import analyse

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asked import certify_family
 from common_kernel_families import random_family
 from families import random_family as any_family
 from scipy.linalg import expm
@@ -20,8 +21,7 @@ from selection import thinned
 
 from lmi.exact.decimal_rounding import up
 from ptcc_certify import Family, NominalProtocol, SignedDigraph, certify
-from ptcc_certify.certificate.certificate import read_certificate
-from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
+from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.restricted_bounds import deviation_of_signal
 from ptcc_certify.certificate.restricted_claims import LastModeClaim, RateClaim, ShareClaim
 from ptcc_certify.certificate.verdict import assess
@@ -52,7 +52,7 @@ def slowed_by_switches() -> Family:
 
 
 @cache
-def of_slowed(signal: Any) -> FamilyCertificate:
+def of_slowed(signal: Any) -> Certificate:
     return certify_family(slowed_by_switches(), PROTOCOL, [3, -1, 2], signal=signal)
 
 
@@ -65,7 +65,7 @@ def random_families() -> list[Family]:
 
 
 @cache
-def certificates(more: bool = False) -> list[FamilyCertificate]:
+def certificates(more: bool = False) -> list[Certificate]:
     """Of two families and three signals, and of a third whose weights are uncertain; or of what is left."""
     signals = (IN_TIME, ON_CLOCK, "constant")
     stable, consensus, containment, uncertain = random_families()
@@ -86,7 +86,7 @@ def switches(rng: np.random.Generator, signal: Any) -> list[float]:
     return (PROTOCOL.gain.clock(instants[instants < 1]) if signal.clock == "t" else instants).tolist()
 
 
-def excess(certificate: FamilyCertificate, claim: RateClaim, rng: np.random.Generator) -> float:
+def excess(certificate: Certificate, claim: RateClaim, rng: np.random.Generator) -> float:
     """The largest logarithm of ``V`` over its bound along a random signal."""
     part, m = certificate.parts[claim.component], len(certificate.family.modes)
     quotient = Quotient.of(part.component)
@@ -161,7 +161,7 @@ def laplacian(mode: Any, rng: np.random.Generator) -> np.ndarray:
     return L
 
 
-def deviation_ratio(certificate: FamilyCertificate, rng: np.random.Generator) -> float:
+def deviation_ratio(certificate: Certificate, rng: np.random.Generator) -> float:
     """The largest ratio of a deviation from the final state to its bound, along a random signal that is admissible."""
     t = np.linspace(0, 0.95, 12)
     clock = PROTOCOL.gain.clock(t)
@@ -304,7 +304,7 @@ def test_no_claim_is_larger_than_its_proof():
 # ---------------------------------------------------------------------- the last mode
 
 
-def last(family: Family, signal: Any = IN_TIME, **more: Any) -> FamilyCertificate:
+def last(family: Family, signal: Any = IN_TIME, **more: Any) -> Certificate:
     return certify_family(family, PROTOCOL, range(1, family.n_nodes + 1), signal=signal, **more)
 
 
@@ -517,7 +517,7 @@ def test_a_rate_that_is_asked_for_is_met_by_that_for_every_signal_where_shares_p
     (claim,) = made.restricted
     assert isinstance(claim, ShareClaim) and made.rate is not None and claim.rate > made.rate
     asked = Expectations(min_rate=made.rate)
-    less = replace(made, restricted=(replace(claim, rate=made.rate / 2),), expectations=asked)
+    less = made.changed(restricted=(replace(claim, rate=made.rate / 2),), expectations=asked)
     assert less.rate_of_signal == made.rate and assess(less, made.checked).asked == "met"
 
 

@@ -70,7 +70,7 @@ def agree(saved: Certificate, made: ptcc.Certificate) -> None:
     assert structure_document(saved.structure) == structure_document(made.structure)
     assert (saved.protocol, saved.initial_state, saved.sigma0) == (made.protocol, made.initial_state, made.sigma0)
     assert (saved.reaching, saved.verdict, saved.claims) == (made.reaching, made.verdict, made.claims)
-    assert (saved.rate, saved.overshoot, saved.paper_rate) == (made.rate, made.overshoot, made.proof.rate)
+    assert (saved.rate, saved.overshoot, saved.paper_rate) == (made.rate, made.overshoot, made.paper_rate)
     assert saved.upper_bound == made.upper_bound and saved.optimality_ratio == made.optimality_ratio
     assert type(saved.envelope) is type(made.envelope)
     assert len(saved.envelope.functions) == len(made.envelope.functions)

@@ -20,14 +20,13 @@ import numpy as np
 import pytest
 from agent_cases import agent_case
 from agent_documents import Setting, damping_bound, document, final_state, obligations, of_graph
-from asked import certify_words
+from asked import certify_family, certify_words
 from cpu_time import at_most
 from generators import all_classes, random_graph
 from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
 from mutations import Json, at, changed, judged_mutants, mutants, nudged, resealed
 from oracle_agents import false_claims_of_agents
 
-from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.certificate.json_schema import json_schema
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import agent_motion, check

@@ -14,13 +14,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from asked import certify_words
+from asked import certify_family, certify_words
 from generators import all_classes, random_graph
 from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
 from mutations import Json, changed, judged_mutants, mutants, nudged, resealed
 from oracle_cascade import false_claims_of_cascade
 
-from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.certificate.json_schema import json_schema
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph

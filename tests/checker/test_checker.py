@@ -40,7 +40,7 @@ from ptcc_certify import checker
 from ptcc_certify.bounds import enclosed_ends
 from ptcc_certify.bounds import final_state as final_states
 from ptcc_certify.bounds.input.initial_set import box, ellipsoid
-from ptcc_certify.certificate import procedure
+from ptcc_certify.certificate import graph_steps
 from ptcc_certify.certificate import section_writer as vectors
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.checking import record
@@ -688,7 +688,7 @@ def test_odd_gains_leave_the_rest_certified(gains: dict[str, Any], size: Any):
 def large(name: str, seed: int = 3, slides: bool = False) -> Json:
     """The JSON of a certificate of a small graph that is treated as a large one."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(procedure, "EXACT_NODES", 0)
+        patch.setattr(graph_steps, "EXACT_NODES", 0)
         patch.setattr(final_states, "EXACT_NODES", 0)
         return made.__wrapped__(name, seed, slides)
 

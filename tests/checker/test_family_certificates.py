@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asked import certify_family, family_certificate
 from common_kernel_families import random_family as with_common_kernel
 from cpu_time import at_most
 from families import KINDS, random_family
@@ -29,8 +30,8 @@ from ptcc_certify import checker
 from ptcc_certify.certificate import section_writer
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.certificate_file import RejectedCertificate
-from ptcc_certify.certificate.document import family_document
-from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate, certify_family
+from ptcc_certify.certificate.document import certificate_document
+from ptcc_certify.certificate.family_proof import ComponentProof
 from ptcc_certify.certificate.json_schema import json_schema
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -62,7 +63,7 @@ def document_of_rows(family: Family) -> Json:
     parts = tuple(ComponentProof(c, tuple(follower_functions(c))) for c in decide(family))
     assert all(part.functions for part in parts)
     state = tuple(Fraction(k) for k in range(1, family.n_nodes + 1))
-    return {**FamilyCertificate(family, PROTOCOL, parts, state).to_dict(), "unverified": {}}
+    return {**family_certificate(family, PROTOCOL, parts, state).to_dict(), "unverified": {}}
 
 
 def function_of_squares(component: FamilyComponent) -> SquaresFunction:
@@ -76,10 +77,10 @@ def document_of_squares(family: Family, sigma0: tuple[Fraction, ...] | None = No
     parts = tuple(ComponentProof(c, (function_of_squares(c),)) for c in decide(family))
     state = tuple(Fraction(k) for k in range(1, family.n_nodes + 1))
     if sigma0 is None:
-        return {**FamilyCertificate(family, PROTOCOL, parts, state).to_dict(), "unverified": {}}
+        return {**family_certificate(family, PROTOCOL, parts, state).to_dict(), "unverified": {}}
     protocol = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=3, mu1=2, mu2=1, mu3=1, delta=1)
     reaching = certified_reaching_times(protocol, sigma0)
-    return {**FamilyCertificate(family, protocol, parts, state, sigma0, reaching).to_dict(), "unverified": {}}
+    return {**family_certificate(family, protocol, parts, state, sigma0, reaching).to_dict(), "unverified": {}}
 
 
 def two_rings() -> Family:
@@ -239,7 +240,7 @@ def sliding_cases() -> list[tuple[str, Json]]:
     )
     parts = tuple(ComponentProof(c, tuple(follower_functions(c))) for c in decide(led))
     state, sigma0 = tuple(map(Fraction, (1, 2, 3, 4))), tuple(map(Fraction, (1, 0, -1, 2)))
-    made = FamilyCertificate(led, protocol, parts, state, sigma0, certified_reaching_times(protocol, sigma0))
+    made = family_certificate(led, protocol, parts, state, sigma0, certified_reaching_times(protocol, sigma0))
     found.append(("sliding rows", {**made.to_dict(), "unverified": {}}))
     return found
 
@@ -667,7 +668,7 @@ def test_a_row_of_a_kernel_has_columns_of_its_own_component_alone():
 def test_many_components_take_time_in_proportion():
     edges = [(f"{s}{i}", f"{t}{i}", 1, 1 + (t == "d")) for i in range(500) for s, t in ("ac", "bc", "cd")]
     family = Family.from_intervals(edges)
-    data = family_document(FamilyCertificate(family, PROTOCOL, tuple(map(ComponentProof, decide(family)))))[0]
+    data = certificate_document(family_certificate(family, PROTOCOL, tuple(map(ComponentProof, decide(family)))))[0]
     with at_most(5):
         assert check(data, stdlib=True).accepted
 
@@ -764,7 +765,7 @@ def hostile(n: int, edges: list[Any] | None = None, multiplier: str = "1000", mo
     star: Any = [("h", f"v{i}", 1, 2) for i in range(n)]
     family = Family.switching([Family.from_intervals(edges or star) for _ in range(modes)])
     parts = tuple(map(ComponentProof, decide(family)))
-    data = family_document(FamilyCertificate(family, PROTOCOL, parts))[0]
+    data = certificate_document(family_certificate(family, PROTOCOL, parts))[0]
     labels, q = list(family.labels), len(edges or star)
     function = {"class": "full", "component": 0, "nodes": labels[1:], "rate": "-100"}
     function["lower_triangle"] = [["1" if i == j else "0" for j in range(i + 1)] for i in range(n)]
@@ -818,7 +819,7 @@ def with_many_rows(followers: int, leaders: int, modes: int) -> Json:
     known += [("f0", f"f{k}", 1, 2) for k in range(1, followers)]
     pairs = [(f"f{i}", f"f{k}", 0, 1) for i in range(1, followers) for k in range(1, followers) if i != k]
     family = Family.switching([Family.from_intervals(known + pairs)] * modes)
-    return family_document(FamilyCertificate(family, PROTOCOL, tuple(map(ComponentProof, decide(family)))))[0]
+    return certificate_document(family_certificate(family, PROTOCOL, tuple(map(ComponentProof, decide(family)))))[0]
 
 
 def with_many_functions(leaders: int, modes: int) -> Json:
@@ -864,13 +865,13 @@ def test_what_is_read_back_says_the_same(k: int, kind: str, tmp_path: Path):
     made.save(tmp_path / "c.json")
     saved = read_certificate(tmp_path / "c.json")
     assert (saved.behaviours, saved.rate, saved.family) == (made.behaviours, made.rate, made.family)
-    assert (saved.final_states, saved.input_peaks, saved.bounded) == (made.final_states, made.input_peaks, made.bounded)
+    assert (saved.final_state, saved.input_peaks, saved.bounded) == (made.final_state, made.input_peaks, made.bounded)
     assert (saved.deviation_bound([1, 0.5, 0.1]) == made.deviation_bound([1, 0.5, 0.1])).all()
     assert saved.verdict == made.verdict == "certified" and saved.checked.accepted
     assert [part.upper_bound for part in saved.parts] == [part.upper_bound for part in made.parts]
     saved.save(tmp_path / "again.json")
     assert (tmp_path / "again.json").read_bytes() == (tmp_path / "c.json").read_bytes()
-    assert read_certificate(made.to_dict()).final_states == made.final_states
+    assert read_certificate(made.to_dict()).final_state == made.final_state
 
 
 def test_functions_of_rows_are_read_back():
@@ -878,7 +879,7 @@ def test_functions_of_rows_are_read_back():
         if name.startswith("rows"):
             saved = read_certificate(resealed(data))
             assert [V.kind for V in saved.parts[0].functions] == [V["class"] for V in data["lyapunov"]["functions"]]
-            for told, ends in zip(data["final_state"].values(), saved.final_states, strict=True):
+            for told, ends in zip(data["final_state"].values(), saved.final_state, strict=True):
                 middle, radius = (Fraction(told[k]) for k in ("mid", "radius")) if isinstance(told, dict) else (told, 0)
                 middle = Fraction(middle)
                 assert middle - radius <= ends[0] <= ends[1] <= middle + radius

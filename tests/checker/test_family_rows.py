@@ -9,11 +9,12 @@ from functools import cache
 
 import numpy as np
 import pytest
+from asked import certify_family, family_certificate
 from mutations import Json, changed, resealed
 from row_families import bounds_of, random_led
 
-from ptcc_certify.certificate.certificate import read_certificate
-from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate, certify_family
+from ptcc_certify.certificate.certificate import Certificate, read_certificate
+from ptcc_certify.certificate.family_proof import ComponentProof
 from ptcc_certify.checker import check
 from ptcc_certify.checker.reading import exact
 from ptcc_certify.graphs.family import Family
@@ -24,11 +25,11 @@ from ptcc_certify.theorems.family_behaviour import decide
 KINDS = ("stability", "bipartite consensus", "bipartite containment")
 
 
-def certificate(family: Family, losses: tuple[float, ...] = (0.01,)) -> FamilyCertificate:
+def certificate(family: Family, losses: tuple[float, ...] = (0.01,)) -> Certificate:
     """With functions of followers alone."""
     x0 = tuple(Fraction(7 * k % 11 - 5, 2) for k in range(family.n_nodes))
     parts = [ComponentProof(c, tuple(follower_functions(c, losses)) if c.kernel else ()) for c in decide(family)]
-    return FamilyCertificate(family, NominalProtocol(T=1, rho1=1, rho2=30, kappa=3), tuple(parts), x0)
+    return family_certificate(family, NominalProtocol(T=1, rho1=1, rho2=30, kappa=3), tuple(parts), x0)
 
 
 @cache
@@ -113,7 +114,7 @@ def test_files_are_read_back(tmp_path):
     (V,), (W,) = cert.parts[0].functions, again.parts[0].functions
     assert isinstance(W, FollowerFunction) and V.rate == W.rate
     assert [bounds_of(x) for x in (V.speeds, V.sizes)] == [bounds_of(x) for x in (W.speeds, W.sizes)]
-    assert again.final_states == cert.final_states and again.input_peaks == cert.input_peaks
+    assert again.final_state == cert.final_state and again.input_peaks == cert.input_peaks
     remaining = np.linspace(0, 1, 5)
     assert (again.deviation_bound(remaining) == cert.deviation_bound(remaining)).all()
 
@@ -126,4 +127,4 @@ def test_a_large_family_gets_a_rate():
         edges += [(s, t, 2, 3) for s in sorted({rng.randrange(leaders), rng.randrange(t)})]
     cert = certify_family(Family.from_intervals(edges), NominalProtocol(T=1, rho1=1, rho2=9, kappa=3), [1.0] * n)
     assert cert.verdict == "certified" and cert.rate > Fraction(1, 2) and cert.bounded
-    assert cert.final_states == ((1, 1),) * n
+    assert cert.final_state == ((1, 1),) * n

@@ -8,11 +8,13 @@ from itertools import product
 
 import numpy as np
 import pytest
+from asked import family_certificate
 from mutations import changed, resealed
 from row_families import bounds_of, random_led
 from selection import thinned
 
-from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.family_proof import ComponentProof
 from ptcc_certify.checker import check
 from ptcc_certify.checker.array_digraph import ArrayDigraph
 from ptcc_certify.checker.digraph import Digraph
@@ -40,11 +42,11 @@ def long_family(rng: random.Random, family: Family) -> Family:
     return Family.switching(modes)
 
 
-def certificate(family: Family) -> FamilyCertificate:
+def certificate(family: Family) -> Certificate:
     """With functions of followers alone."""
     x0 = tuple(Fraction(7 * k % 11 - 5, 3) for k in range(family.n_nodes))
     parts = [ComponentProof(c, tuple(follower_functions(c, (0.1, 0.3))) if c.kernel else ()) for c in decide(family)]
-    return FamilyCertificate(family, NominalProtocol(T=1, rho1=1, rho2=30, kappa=3), tuple(parts), x0)
+    return family_certificate(family, NominalProtocol(T=1, rho1=1, rho2=30, kappa=3), tuple(parts), x0)
 
 
 @pytest.mark.parametrize("seed", range(100))

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asked import certify_family
 from mutations import Json, changed, resealed
 from row_families import bounds_of
 
-from ptcc_certify.certificate import family_certificate, section_writer
-from ptcc_certify.certificate.certificate import read_certificate
-from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
+from ptcc_certify.certificate import family_steps, section_writer
+from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.family_comparison import compare
 from ptcc_certify.certificate.graph_sections import certificate_family, family_sections
 from ptcc_certify.checker import check
@@ -48,7 +48,7 @@ def state(n: int) -> list[Fraction]:
 
 
 @cache
-def certificate(modes: int) -> FamilyCertificate:
+def certificate(modes: int) -> Certificate:
     family = random_core(modes, 200 if modes == 1 else 300, modes)
     return certify_family(family, PROTOCOL, state(family.n_nodes))
 
@@ -64,7 +64,7 @@ def test_random_unbalanced_families_of_hundreds_of_agents_are_certified_with_a_r
     (V,) = cert.parts[0].functions
     assert isinstance(V, SquaresFunction) and len(V.factors) == modes
     assert cert.verdict == "certified" and cert.bounded and cert.rate > 3
-    assert cert.final_states == ((0, 0),) * cert.family.n_nodes and min(cert.input_peaks) > 0
+    assert cert.final_state == ((0, 0),) * cert.family.n_nodes and min(cert.input_peaks) > 0
     assert check(cert.to_dict(), stdlib=True).accepted
     assert np.isfinite(cert.deviation_bound([0.9, 0.1])).all()
 
@@ -201,7 +201,7 @@ def test_a_sum_of_squares_of_agents_that_agree_is_refused():
 def test_small_families_take_it_where_the_search_finds_nothing_and_else_what_was_found(monkeypatch):
     family = random_core(0, 8, edges=2)
     found = certify_family(family, PROTOCOL)
-    monkeypatch.setattr(family_certificate, "search_family", lambda *args, **keywords: FamilySearch())
+    monkeypatch.setattr(family_steps, "search_family", lambda *args, **keywords: FamilySearch())
     cert = certify_family(family, PROTOCOL)
     assert [V.kind for V in cert.parts[0].functions] == ["squares"] and cert.verdict == "certified"
     assert 0 < cert.rate <= found.rate and all(V.kind != "squares" for V in found.parts[0].functions)

@@ -14,11 +14,11 @@ from pathlib import Path
 
 import pytest
 from agent_documents import Setting, document
+from asked import certify_family
 from paper_examples import paper_examples
 from selection import thinned
 
 import ptcc_certify
-from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family

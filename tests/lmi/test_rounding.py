@@ -113,8 +113,8 @@ def test_the_screen_rounds_to_the_safe_side(k: int):
         re.findall(rf"optimality ratio at least {NUMBER}$", text.replace(" (", "\n("), re.M),
         cert.rate / cert.upper_bound,
     )
-    if cert.proof.rate is not None and cert.lyapunov is not None:
-        below(re.findall(rf"paper {NUMBER} =", text), cert.proof.rate)
+    if cert.paper_rate is not None and cert.lyapunov is not None:
+        below(re.findall(rf"paper {NUMBER} =", text), cert.paper_rate)
         above(re.findall(rf"overshoot constant {NUMBER} of", text), cert.lyapunov.overshoot)
     taken = re.findall(rf"(?:full|lmi|perron) {NUMBER} \(overshoot {NUMBER}\)", text)
     assert len(taken) == len(cert.search.functions)

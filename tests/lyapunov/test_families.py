@@ -8,6 +8,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from asked import certify_family
 from common_kernel_families import KINDS, random_family
 from scipy.linalg import expm
 from selection import thinned
@@ -15,7 +16,6 @@ from selection import thinned
 import lmi
 import lmi.common
 from ptcc_certify import NominalProtocol
-from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family

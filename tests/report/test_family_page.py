@@ -136,9 +136,9 @@ def test_a_page_of_an_undecided_family_says_what_to_try_and_claims_nothing(made,
         replace(part, component=replace(part.component, behaviour=None, kernel=None), functions=(), upper_bound=None)
         for part in made.parts
     )
-    undecided = replace(made, parts=parts)
+    undecided = made.changed(parts=parts)
     assert write_report(undecided, tmp_path / "u.html", simulation=False) == "undecided"
-    assert repr(undecided) == "FamilyCertificate(not decided, rate none, undecided)"
+    assert repr(undecided) == "Certificate(not decided, rate none, undecided)"
     assert undecided.to_dict()["verdict"] == "undecided" and undecided.to_pandas()["least"].isna().all()
     text = words((tmp_path / "u.html").read_text("utf-8"))
     assert "Undecided refutes nothing" in text and "Undecided: what the agents do" in text and "not decided" in text
@@ -168,7 +168,7 @@ def test_a_statement_has_intervals_behaviour_rate_bound_and_input(made, tmp_path
 def test_intervals_of_the_page_enclose_what_is_proved():
     pair = as_family([("a", "b", "1/3", "2/3"), ("b", "a", "1/7", "6/7")])
     saved = read_certificate(certify(pair, PROTOCOL, ["1/3", "2/7"]).to_dict())
-    low, high = saved.final_states[0]
+    low, high = saved.final_state[0]
     shown = re.search(r"\[([0-9.]+),\N{NO-BREAK SPACE}([0-9.]+)\]", report_html(saved))
     assert float(shown[1]) <= low <= high <= float(shown[2])
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from asked import certify_family
 
-from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family

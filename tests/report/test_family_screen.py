@@ -8,12 +8,13 @@ import re
 from fractions import Fraction
 
 import pytest
+from asked import certify_family, family_certificate
 from families import KINDS, random_family
 from rich.cells import cell_len
 from selection import thinned
 
 import ptcc_certify as ptcc
-from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
+from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.judgements import first_input
 from ptcc_certify.errors import unlabelled
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -246,8 +247,8 @@ def test_a_wish_is_refuted_by_an_input_that_some_member_has_at_the_start():
         assert largest == max(_member_input(mode, x, rng) for mode in family.modes) * PROTOCOL.gain.first
 
 
-def _shell(family: Family, x: tuple[Fraction, ...]) -> FamilyCertificate:
-    return FamilyCertificate(family, PROTOCOL, (), x)
+def _shell(family: Family, x: tuple[Fraction, ...]) -> Certificate:
+    return family_certificate(family, PROTOCOL, (), x)
 
 
 def _member_input(mode: Mode, x: list[Fraction], rng: random.Random) -> Fraction:
@@ -325,7 +326,7 @@ def test_more_functions_than_the_check_takes_are_left_out_and_nothing_rests_on_t
     assert refused.verdict == "undecided" and "more than 2 Lyapunov functions" in (refused.checked.reason or "")
     assert "the independent check rejects" in told
     assert not any(f"\n{entry}" in told for entry in ("claim", "rate", "x(T)", "error", "input"))
-    monkeypatch.setattr("ptcc_certify.certificate.family_certificate.MANY_FUNCTIONS", 2)
+    monkeypatch.setattr("ptcc_certify.certificate.family_steps.MANY_FUNCTIONS", 2)
     fewer = certify_family(Family.from_intervals(pairs), PROTOCOL, range(6), time_limit=60)
     assert fewer.verdict == "certified" and not any(part.functions for part in fewer.parts)
     assert any("more than 2 Lyapunov functions" in note for note in fewer.notes)

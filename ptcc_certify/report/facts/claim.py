@@ -34,8 +34,6 @@ from ptcc_certify.theorems.family_groups import AgreeingGroup, FamilyGroups
 if TYPE_CHECKING:
     from ptcc_certify.bounds.attracting_box import AttractingBox
     from ptcc_certify.certificate.certificate import Certificate
-    from ptcc_certify.certificate.family_certificate import FamilyCertificate
-    from ptcc_certify.certificate.family_content import FamilyContent
     from ptcc_certify.checker.reading import Interval
 
 #: Components of which a screen tells, and lines of a text on the short one.
@@ -48,7 +46,7 @@ DRIVEN = "ends at x(0) - sigma(0)"
 WHATEVER = {"any": "for every signal", "constant": "if mode and weights never change"}
 
 
-def assumptions(certificate: Certificate | FamilyCertificate) -> list[str]:
+def assumptions(certificate: Certificate) -> list[str]:
     """Tell what claim, final state, rate and error are without, where more was asked."""
     messages = None if certificate.late is None else certificate.late.messages
     virtual = messages is not None and messages.vehicles is not None
@@ -128,7 +126,7 @@ def sharpest(component: FamilyComponent) -> str:
 
 
 def family_claims(
-    components: Sequence[FamilyComponent], when: str = "", certificate: FamilyCertificate | None = None
+    components: Sequence[FamilyComponent], when: str = "", certificate: Certificate | None = None
 ) -> Facts:
     """Tell what every component does; where that depends on the signal, why, and what holds all the same."""
     disturbed = certificate is not None and certificate.sigma0 is not None
@@ -269,7 +267,7 @@ def _agreeing(component: FamilyComponent, groups: Sequence[AgreeingGroup]) -> li
     ]
 
 
-def told_ranges(certificate: FamilyContent) -> dict[int, tuple[Interval, ...]]:
+def told_ranges(certificate: Certificate) -> dict[int, tuple[Interval, ...]]:
     """Return between which ends every signal keeps agents, of components of which no last mode tells the same."""
     last = certificate.ends_of_signal
     same = {k for k, claim in last.items() if isinstance(claim, LastModeClaim) and claim.final_states is not None}

@@ -26,7 +26,6 @@ from ptcc_certify.theorems.family_rate import explicit_rate
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
-    from ptcc_certify.certificate.family_certificate import FamilyCertificate
 
 #: What proves an upper bound on the rate, in words.
 BOUND_KINDS = {
@@ -74,7 +73,7 @@ def rate_facts(certificate: Certificate) -> Facts:
         yield Fact(head="function", note=f"used {', '.join(used) or 'none, no rate was proved'}", detail=True)
 
 
-def _rate_text(certificate: Certificate | FamilyCertificate, rate: Fraction, limit: str) -> str:
+def _rate_text(certificate: Certificate, rate: Fraction, limit: str) -> str:
     """Tell a proved rate, what decays at it, and its ratio to what limits it."""
     law = "V <= e^(-rate s) V(0)" if certificate.direct else "V <= e^(-rate (s - s(T_r))) V(T_r) from T_r on"
     text = f"{down(rate)} per unit of the stretched clock s, proved: {law}"
@@ -174,9 +173,7 @@ def _deviation_facts(certificate: Certificate) -> Facts:
         yield Fact(head="deviation", value=each, side="up", note=text, detail=True)
 
 
-def _deviation_fact(
-    certificate: Certificate | FamilyCertificate, bound: Callable[[list[float]], np.ndarray], of: str = ""
-) -> Fact:
+def _deviation_fact(certificate: Certificate, bound: Callable[[list[float]], np.ndarray], of: str = "") -> Fact:
     """Tell how far from its final state the farthest agent may be at instants, under the signals ``of`` names."""
     instants = told_instants(certificate.protocol, certificate.direct)[:4]
     worst = bound([remaining for remaining, _ in instants]).max(axis=0, initial=0.0)
@@ -190,7 +187,7 @@ def _deviation_fact(
 # ---------------------------------------------------------------------- families
 
 
-def family_rate_facts(certificate: FamilyCertificate) -> Facts:
+def family_rate_facts(certificate: Certificate) -> Facts:
     """Tell the proved rate, its upper bound and their ratio; where no rate was found, the one in closed form."""
     if not certificate.common or all(part.component.nodes.size == 1 for part in certificate.parts):
         return
@@ -218,14 +215,14 @@ def family_rate_facts(certificate: FamilyCertificate) -> Facts:
     yield Fact(head="rate", standing=standing, note=joined("; ", [joined("", [text, why]), limit]))
 
 
-def explicit_logs(certificate: FamilyCertificate) -> list[float]:
+def explicit_logs(certificate: Certificate) -> list[float]:
     """Return the logarithms of rates in closed form, of every component of several agents; none if one has none."""
     explicit = [explicit_rate(part.component) for part in certificate.parts if part.component.nodes.size > 1]
     logs = [one.log10_decay_rate for one in explicit if one is not None]
     return logs if len(logs) == len(explicit) else []
 
 
-def no_search(certificate: FamilyCertificate) -> Sentence:
+def no_search(certificate: Certificate) -> Sentence:
     """Tell why no rate was proved: too many agents for a search, or too little time; nothing where it is not known."""
     from ptcc_certify.lyapunov.family_search import CLOSED_ROWS, TOO_MANY_ROWS
 
@@ -243,7 +240,7 @@ def no_search(certificate: FamilyCertificate) -> Sentence:
     return ("the searches took too long; raise ", Change("time_limit")) if late else ""
 
 
-def function_facts(certificate: FamilyCertificate) -> Facts:
+def function_facts(certificate: Certificate) -> Facts:
     """Tell the rate of every Lyapunov function, of every mode, and what proves the upper bound."""
     for part in certificate.parts:
         names = [labelled(mode_name(certificate.family, k)) for k in range(len(certificate.family.modes))]
@@ -261,7 +258,7 @@ def function_facts(certificate: FamilyCertificate) -> Facts:
             yield Fact(head="bound", value=part.upper_bound.value, side="up", note=text, detail=True)
 
 
-def family_error_facts(certificate: FamilyCertificate) -> Facts:
+def family_error_facts(certificate: Certificate) -> Facts:
     """Tell how near the agents are to their final states by when, for every signal and those that were asked for."""
     from ptcc_certify.certificate.restricted_bounds import deviation_of_signal, nearer_for_signal  # slow to load
 
@@ -270,8 +267,8 @@ def family_error_facts(certificate: FamilyCertificate) -> Facts:
     every = certificate.common and certificate.rate is not None
     if every:
         yield from _family_error(certificate, certificate.deviation_bound, every_text(certificate))
-    if nearer_for_signal(certificate):
-        bound = partial(deviation_of_signal, certificate)
+    if nearer_for_signal(certificate.family_proof):
+        bound = partial(deviation_of_signal, certificate.family_proof)
         again = certificate.rate is not None
         usual = (
             list(_family_error(certificate, certificate.deviation_bound, " (these signals)", again)) if again else []
@@ -281,7 +278,7 @@ def family_error_facts(certificate: FamilyCertificate) -> Facts:
 
 
 def _family_error(
-    certificate: FamilyCertificate, bound: Callable[[list[float]], np.ndarray], of: str, again: bool = False
+    certificate: Certificate, bound: Callable[[list[float]], np.ndarray], of: str, again: bool = False
 ) -> Facts:
     """Tell how near at 0.99 T, and at every instant; ``again`` after the same of other signals."""
     left, when = told_instants(certificate.protocol, certificate.direct)[SHORT]

@@ -16,7 +16,6 @@ from ptcc_certify.report.text_layout import TEXT, agent_text, shorten_list, valu
 if TYPE_CHECKING:
     from ptcc_certify.bounds.input.effort import Effort, Limited
     from ptcc_certify.certificate.certificate import Certificate
-    from ptcc_certify.certificate.family_certificate import FamilyCertificate
     from ptcc_certify.checker.input_formulas import InitialSet
 
 
@@ -147,7 +146,7 @@ def initial_states_text(initial_set: InitialSet) -> str:
     return f"all |x_k(0)| <= {near(Fraction(R))}" if cube else "the initial states asked about"
 
 
-def family_input_facts(certificate: FamilyCertificate) -> Facts:
+def family_input_facts(certificate: Certificate) -> Facts:
     """Tell whether the input stays finite for every signal, and how large it gets."""
     every, peaks = every_text(certificate), certificate.input_peaks
     if any(part.component.behaviour is None for part in certificate.parts):

@@ -21,7 +21,6 @@ from ptcc_certify.report.text_layout import agent_text, shorten_list
 if TYPE_CHECKING:
     from ptcc_certify.bounds.late_messages import LateBounds
     from ptcc_certify.certificate.certificate import Certificate
-    from ptcc_certify.certificate.family_certificate import FamilyCertificate
     from ptcc_certify.model.base import Protocol
     from ptcc_certify.model.late_messages import LateMessages
     from ptcc_certify.model.moving_leaders import MovingLeaders
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
 FROM_WITHIN_1 = ", from within 1 of it at first"
 
 
-def late_facts(certificate: Certificate | FamilyCertificate) -> Facts:
+def late_facts(certificate: Certificate) -> Facts:
     """Tell how late messages are; what cannot be then, and what is left at the deadline."""
     late = certificate.late
     if late is None:
@@ -85,7 +84,7 @@ def _vehicles(late: LateBounds) -> Facts:
         yield Fact(head="agents", note=f"{name} at most {each}{whole}", detail=True)
 
 
-def tracking_facts(certificate: Certificate | FamilyCertificate) -> Facts:
+def tracking_facts(certificate: Certificate) -> Facts:
     """Tell how followers track leaders that move."""
     tracking = certificate.tracking
     if tracking is None:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from lmi.exact.decimal_rounding import near
 from ptcc_certify.certificate.answer import rejects
 from ptcc_certify.certificate.facts import Fact, Facts
-from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.report.facts.agents import agents_facts
 from ptcc_certify.report.facts.claim import assumptions, claim_facts, family_claims
 from ptcc_certify.report.facts.decay import (
@@ -32,7 +31,7 @@ if TYPE_CHECKING:
 
 
 def facts_of(
-    certificate: Certificate | FamilyCertificate,
+    certificate: Certificate,
     name: str | None = None,
     origins: Mapping[str, str] | None = None,
     details: bool = True,
@@ -41,7 +40,7 @@ def facts_of(
 
     Parameters
     ----------
-    certificate : Certificate or FamilyCertificate
+    certificate : Certificate
     name : str, optional
         What the graph is called, unless as the certificate says.
     origins : mapping of str to str, optional
@@ -59,37 +58,39 @@ def facts_of(
     """
     origins = certificate.origins if origins is None else origins
     if name is None:
-        name = certificate.origins.get("graph", "" if isinstance(certificate, FamilyCertificate) else "graph")
+        name = certificate.origins.get("graph", "" if certificate.of_family else "graph")
     facts: list[Fact] = []
-    if isinstance(certificate, FamilyCertificate):
+    if certificate.of_family:
         components = [part.component for part in certificate.parts]
         facts += family_facts(certificate.family, name, origins.get("read", ""), components if details else None)
     else:
         facts += graph_facts(certificate.structure, name, details)
     facts += protocol_facts(certificate, origins)
     if not rejects(certificate.checked):
-        if isinstance(certificate, FamilyCertificate):
-            facts += _of_family(certificate, origins, details)
-        else:
-            facts += _of_graph(certificate, origins, details)
+        facts += _answers(certificate, origins, details)
     return [*facts, *verdict_facts(certificate)]
 
 
-def _sliding(certificate: Certificate | FamilyCertificate) -> Facts:
-    labels, reaching = certificate.labels, certificate.protocol.reaching
-    return sliding_facts(labels, reaching, certificate.sigma0, certificate.reaching)
-
-
-def _of_graph(certificate: Certificate, origins: Mapping[str, str], details: bool) -> Facts:
-    """Tell what becomes of the agents of one graph: first with late messages and moving leaders, if there are any."""
-    drawn = certificate.only_drawn
-    yield from initial_facts(certificate, origins, alone=drawn)
-    yield from _sliding(certificate)
+def _answers(certificate: Certificate, origins: Mapping[str, str], details: bool) -> Facts:
+    """Tell what becomes of the agents: first with late messages and moving leaders, if there are any."""
+    labels, protocol = certificate.labels, certificate.protocol
+    yield from initial_facts(certificate, origins, alone=certificate.only_drawn)
+    yield from sliding_facts(labels, protocol.reaching, certificate.sigma0, certificate.reaching)
     yield from late_facts(certificate)
     yield from tracking_facts(certificate)
     beside = _beside(certificate)
-    yield from claim_facts(certificate)
+    if certificate.of_family:
+        components = [part.component for part in certificate.parts]
+        yield from family_claims(components, f" at T = {near(protocol.T)}", certificate)
+    else:
+        yield from claim_facts(certificate)
     yield from beside
+    yield from (_of_family if certificate.of_family else _of_graph)(certificate, details, bool(beside))
+
+
+def _of_graph(certificate: Certificate, details: bool, beside: bool) -> Facts:
+    """Tell of one graph where its agents end, how fast, and with what input; ``beside`` if more is told before."""
+    drawn = certificate.only_drawn
     if certificate.agents is not None:
         yield from agents_facts(certificate.agents, details)
     elif not drawn:
@@ -97,14 +98,25 @@ def _of_graph(certificate: Certificate, origins: Mapping[str, str], details: boo
     if details:
         yield from rate_facts(certificate)
     if certificate.agents is None and (details or not beside):
-        yield from _details(error_facts(certificate, drawn, details), bool(beside))
-        yield from _details(input_facts(certificate, details), bool(beside))
-        yield from _details(disturbed_facts(certificate), bool(beside))
+        yield from _details(error_facts(certificate, drawn, details), beside)
+        yield from _details(input_facts(certificate, details), beside)
+        yield from _details(disturbed_facts(certificate), beside)
     if details:
         yield from run_facts(certificate)
 
 
-def _beside(certificate: Certificate | FamilyCertificate) -> list[Fact]:
+def _of_family(certificate: Certificate, details: bool, beside: bool) -> Facts:
+    """Tell the same of a family for every signal, and for those that were asked for."""
+    yield from family_rate_facts(certificate)
+    if details:
+        yield from function_facts(certificate)
+    yield from signal_facts(certificate)
+    yield from _details(family_final_facts(certificate), certificate.leaders_move)
+    yield from _details(family_error_facts(certificate), beside)
+    yield from _details(family_input_facts(certificate), beside)
+
+
+def _beside(certificate: Certificate) -> list[Fact]:
     """Tell what the rest of a certificate knows nothing of: nothing, or one fact."""
     without = [text for text in assumptions(certificate) if text != "without limits"]
     text = f"{' and '.join(without)}, in what follows"
@@ -114,22 +126,3 @@ def _beside(certificate: Certificate | FamilyCertificate) -> list[Fact]:
 def _details(facts: Iterable[Fact], are: bool) -> Iterable[Fact]:
     """Return facts, which are details where others stand in their place."""
     return (replace(fact, detail=True) for fact in facts) if are else facts
-
-
-def _of_family(certificate: FamilyCertificate, origins: Mapping[str, str], details: bool) -> Facts:
-    """Tell what becomes of the agents of a family for every signal, and for those that were asked for."""
-    components = [part.component for part in certificate.parts]
-    yield from initial_facts(certificate, origins, alone=False)
-    yield from _sliding(certificate)
-    yield from late_facts(certificate)
-    yield from tracking_facts(certificate)
-    beside = _beside(certificate)
-    yield from family_claims(components, f" at T = {near(certificate.protocol.T)}", certificate)
-    yield from beside
-    yield from family_rate_facts(certificate)
-    if details:
-        yield from function_facts(certificate)
-    yield from signal_facts(certificate)
-    yield from _details(family_final_facts(certificate), certificate.leaders_move)
-    yield from _details(family_error_facts(certificate), bool(beside))
-    yield from _details(family_input_facts(certificate), bool(beside))

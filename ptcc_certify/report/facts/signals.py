@@ -25,7 +25,7 @@ from ptcc_certify.theorems.family_behaviour import DEPENDS
 from ptcc_certify.theorems.family_claims import GENERAL
 
 if TYPE_CHECKING:
-    from ptcc_certify.certificate.family_content import FamilyContent
+    from ptcc_certify.certificate.certificate import Certificate
 
 #: The power of 10 below which what shrinks is not told as a number.
 TINY = -100
@@ -34,7 +34,7 @@ RESTS = "every agent keeps its value"
 CLOCK = {"t": "time", "s": "the clock"}
 
 
-def signal_facts(certificate: FamilyContent) -> Facts:
+def signal_facts(certificate: Certificate) -> Facts:
     """Yield what is proved for restricted signals, component after component.
 
     Examples
@@ -58,7 +58,7 @@ def signal_facts(certificate: FamilyContent) -> Facts:
         name = agent_text(certificate.parts[component].component.family.labels[0])
         return f"component of {name}: " if several else ""
 
-    none = reasons_for_none(certificate)
+    none = reasons_for_none(certificate.family_proof)
     if not certificate.restricted and not none:
         yield Fact(head=head[0], note=f"{head[1]}: nothing more is proved")
     for number, (reason, _) in none.items():
@@ -75,7 +75,7 @@ def signal_facts(certificate: FamilyContent) -> Facts:
         yield Fact(head=head[0], note=f"{where(claim.component)}{head[1]}: {text}")
 
 
-def every_text(certificate: FamilyContent) -> str:
+def every_text(certificate: Certificate) -> str:
     """Tell apart what holds for every signal where more is claimed of some."""
     return "" if certificate.signal == "any" else " (every signal)"
 
@@ -97,13 +97,13 @@ def signal_text(signal: SignalClass) -> tuple[str, str]:
     return "constant", "if mode and weights never change"
 
 
-def _stands_alone(certificate: FamilyContent, claim: FinalValueClaim) -> bool:
+def _stands_alone(certificate: Certificate, claim: FinalValueClaim) -> bool:
     """Tell whether no other claim says what single modes do to a component whose end depends on the signal."""
     depends = certificate.parts[claim.component].component.behaviour == DEPENDS
     return depends and claim.component not in certificate.ends_of_signal
 
 
-def _last_mode_text(certificate: FamilyContent, claim: LastModeClaim | FinalValueClaim) -> str:
+def _last_mode_text(certificate: Certificate, claim: LastModeClaim | FinalValueClaim) -> str:
     """Tell what the last mode does, of each mode where they differ."""
     own = claim.behaviours
     begin = "the last mode decides" if len(own) > 1 and claim.signal != "constant" else ""
@@ -141,7 +141,7 @@ def _window_text(claim: WindowClaim) -> str:
     return f"{claim.behaviour}; what is left shrinks by 1e{left} of it, or more, {in_each}"
 
 
-def _share_text(certificate: FamilyContent, claim: ShareClaim) -> str:
+def _share_text(certificate: Certificate, claim: ShareClaim) -> str:
     names = (labelled(printable(mode_name(certificate.family, k))) for k in range(len(certificate.family.modes)))
     own = map(down, claim.form.function.rates)
     each = ", ".join(f"{name} {rate}" for name, rate in zip(names, own, strict=True))
@@ -149,13 +149,13 @@ def _share_text(certificate: FamilyContent, claim: ShareClaim) -> str:
     return f"{claim.behaviour}, rate {down(claim.rate)}; of each: {each}; {late}"
 
 
-def rests(certificate: FamilyContent) -> bool:
+def rests(certificate: Certificate) -> bool:
     """Tell whether the signals that were asked for bring all agents to rest whose end depends on the signal."""
     claims = certificate.ends_of_signal.values()
     return not any(isinstance(claim, LastModeClaim) and None in claim.behaviours for claim in claims)
 
 
-def agreement_text(certificate: FamilyContent) -> str:
+def agreement_text(certificate: Certificate) -> str:
     """Tell that all agents end at one value, up to camps, where every mode that may be the last one sees to it.
 
     The ends between which they stay bound that value; they do not say that the agents agree.
@@ -178,7 +178,7 @@ def agreement_text(certificate: FamilyContent) -> str:
     return ", all at one value" if all((sign > 0).all() for sign in signs) else ", all at one |x(T)|"
 
 
-def _rate_text(certificate: FamilyContent, claim: RateClaim) -> str:
+def _rate_text(certificate: Certificate, claim: RateClaim) -> str:
     if claim.forms is None:
         more = "" if claim.component in certificate.final_values else "; nothing more is proved"
         return f"rate {down(claim.rate)}, as for every signal{more}"

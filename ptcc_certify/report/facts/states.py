@@ -27,15 +27,13 @@ from ptcc_certify.report.text_layout import (
 if TYPE_CHECKING:
     from ptcc_certify.bounds.final_state import FinalState
     from ptcc_certify.certificate.certificate import Certificate
-    from ptcc_certify.certificate.family_certificate import FamilyCertificate
-    from ptcc_certify.certificate.family_content import FamilyContent
     from ptcc_certify.checker.reading import Interval
 
 #: Columns of a list of intervals on a short screen and on a long one.
 _SHORT, _LONG = 2 * TEXT - 20, 12 * TEXT
 
 
-def initial_facts(certificate: Certificate | FamilyCertificate, origins: Mapping[str, str], alone: bool) -> Facts:
+def initial_facts(certificate: Certificate, origins: Mapping[str, str], alone: bool) -> Facts:
     """Tell the initial positions, and where they come from; ``alone`` if those of the simulated run alone."""
     if (begin := certificate.initial_positions) is not None:
         drawn = f" ({origins['x(0)']})" if "x(0)" in origins else ""
@@ -95,17 +93,17 @@ def _accuracy(result: FinalState, rounded: str = "here to 5 digits") -> str:
     return "exact" if not cut else rounded if rounded == "rounded" else f"exact; {rounded}"
 
 
-def family_final_facts(certificate: FamilyCertificate) -> Facts:
+def family_final_facts(certificate: Certificate) -> Facts:
     """Tell between which ends every agent is at the deadline, agents with the same ends together."""
     if certificate.refused:
         return
     labels = certificate.labels
     ends: Sequence[Interval | None] | None = None
     head, more = "x(T)", ""
-    if certificate.final_states is not None and certificate.common:
-        ends, more = certificate.final_states, every_text(certificate)
-    elif certificate.final_states is not None and any(one is not None for one in last_states(certificate)):
-        ends, more = states_of_signal(certificate), f"{agreement_text(certificate)} (these signals)"
+    if certificate.final_state is not None and certificate.common:
+        ends, more = certificate.final_state, every_text(certificate)
+    elif certificate.final_state is not None and any(one is not None for one in last_states(certificate.family_proof)):
+        ends, more = states_of_signal(certificate.family_proof), f"{agreement_text(certificate)} (these signals)"
         head = "x(T)" if rests(certificate) else "x(t)"
     if ends is not None:
         note, brief = (f"{intervals_text(labels, ends, width)}{more}" for width in (_LONG, _SHORT))
@@ -119,14 +117,14 @@ def family_final_facts(certificate: FamilyCertificate) -> Facts:
         yield Fact(head="x(t)", note=text, brief=(brief,), detail=place > 0)
 
 
-def attained_text(certificate: FamilyContent) -> str:
+def attained_text(certificate: Certificate) -> str:
     """Tell how near some constant weights come to the ends that are told of all of them."""
     values = (ends for claim in certificate.final_values.values() for ends in claim.values if ends is not None)
     within = max(ends.within for ends in values)
     return f"some weights come within {up(within, 2)} of either end" if within else "some weights attain these ends"
 
 
-def constant_text(certificate: FamilyContent, width: int = 12 * TEXT) -> str:
+def constant_text(certificate: Certificate, width: int = 12 * TEXT) -> str:
     """Tell between which ends agents are at the deadline if mode and weights never change; "" if that says no more.
 
     Of agents whose end depends on the signal nothing is told here.
@@ -137,7 +135,7 @@ def constant_text(certificate: FamilyContent, width: int = 12 * TEXT) -> str:
     >>> constant_text(certify(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [0, 6], signal="constant"))
     'every agent in [2, 3]'
     """
-    columns = certificate.family.labels, constant_states(certificate), certificate.final_states or ()
+    columns = certificate.family.labels, constant_states(certificate.family_proof), certificate.final_state or ()
     rows = [row for row in zip(*columns, strict=False) if None not in row]
     if all(interval_text(own) == interval_text(every) for _, own, every in rows):
         return ""

@@ -15,7 +15,6 @@ from ptcc_certify.report.text_layout import arithmetic
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
-    from ptcc_certify.certificate.family_certificate import FamilyCertificate
     from ptcc_certify.model.base import Protocol
 
 #: Notes that are told.
@@ -27,7 +26,7 @@ def gains_text(p: Protocol) -> str:
     return f"{p.kind}: " + ", ".join(f"{name}={near(getattr(p, name), 12)}" for name in p.to_dict() if name != "kind")
 
 
-def protocol_facts(certificate: Certificate | FamilyCertificate, origins: Mapping[str, str]) -> Facts:
+def protocol_facts(certificate: Certificate, origins: Mapping[str, str]) -> Facts:
     """Tell the protocol with its parameters, and where the initial state comes from."""
     text = f"{gains_text(certificate.protocol)}; {', '.join(_beginning(certificate, origins)) or 'no x(0)'}"
     yield Fact(head="protocol", value=certificate.protocol, note=text)
@@ -36,7 +35,7 @@ def protocol_facts(certificate: Certificate | FamilyCertificate, origins: Mappin
         yield Fact(head="protocol", note=text, detail=True)
 
 
-def _beginning(certificate: Certificate | FamilyCertificate, origins: Mapping[str, str]) -> list[str]:
+def _beginning(certificate: Certificate, origins: Mapping[str, str]) -> list[str]:
     """Tell where initial positions, velocities and so on, and sliding variables, come from."""
     begin = [] if certificate.initial_state is None else [f"x(0) {origins.get('x(0)', 'given')}"]
     if certificate.agents is not None and (states := certificate.agents.initial_state) is not None:
@@ -86,7 +85,7 @@ def run_facts(certificate: Certificate) -> Facts:
     yield from (Fact(head="simulated", standing="observed", note=text, detail=True) for text in texts)
 
 
-def verdict_facts(certificate: Certificate | FamilyCertificate) -> Facts:
+def verdict_facts(certificate: Certificate) -> Facts:
     """Tell the proof, remarks, and the verdict; what is not as one would wish comes first."""
     ended = _cut_off(certificate)
     report, assessment = certificate.checked, certificate.assessment
@@ -111,7 +110,7 @@ def verdict_facts(certificate: Certificate | FamilyCertificate) -> Facts:
     yield Fact(head="verdict", value=assessment.verdict, note=assessment.sentence, brief=(brief,))
 
 
-def _cut_off(certificate: Certificate | FamilyCertificate) -> Sentence:
+def _cut_off(certificate: Certificate) -> Sentence:
     """Tell what was cut off because it took longer than its share of the time limit; nothing if nothing was."""
     if not certificate.cut_off:
         return ""

@@ -12,12 +12,11 @@ from matplotlib.axes import Axes
 
 from ptcc_certify.bounds.envelope import FLOOR_FACTOR
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.model.gain import Gain
 from ptcc_certify.report.plots.runs import bound_label, is_worst, keeps_promise, line_of, runs_of
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
-from ptcc_certify.report.plots.subject import ideal_run_of, ideal_text, limits_text, require_same
+from ptcc_certify.report.plots.subject import certifies_family, ideal_run_of, ideal_text, limits_text, require_same
 from ptcc_certify.simulation.trajectory import Trajectory
 
 #: Horizontal axes of the decay, and their labels; that of time has a unit.
@@ -55,7 +54,7 @@ def plot_decay(
 
     Parameters
     ----------
-    subject : Certificate, its path, Trajectory or FamilyCertificate
+    subject : Certificate, its path, or Trajectory
         A certificate with an initial state and a proved rate; without a run its bounds alone are drawn
         (``certificate.with_simulation()`` adds one). A trajectory without ``certificate`` is drawn alone.
     ax : Axes, optional
@@ -91,7 +90,7 @@ def plot_decay(
     """
     if axis not in _DECAY_AXES:
         raise ParameterError(f'axis "{axis}" is unknown; one of {", ".join(_DECAY_AXES)}')
-    if isinstance(subject, FamilyCertificate):
+    if certifies_family(subject):
         return _draw_signals(axes_of(ax), subject, runs_of(subject, runs), axis, time_unit)
     proved = subject if isinstance(subject, Certificate) else certificate
     run = None if isinstance(subject, Certificate) and subject.trajectory is None else ideal_run_of(subject)
@@ -133,9 +132,7 @@ def plot_decay(
     return finished(ax, _label(axis, time_unit), rf"$\|{name}(t)\| \,/\, \|{name}(0)\|$", title)
 
 
-def _draw_signals(
-    ax: Axes, certificate: FamilyCertificate, runs: Sequence[Trajectory], axis: str, time_unit: str
-) -> Axes:
+def _draw_signals(ax: Axes, certificate: Certificate, runs: Sequence[Trajectory], axis: str, time_unit: str) -> Axes:
     """Draw how far agents are from their final states under many signals below the bound for every signal."""
     first = runs[0]
     before = first.remaining > 0
@@ -161,9 +158,9 @@ def _draw_signals(
     return finished(ax, _label(axis, time_unit), r"$\max_k |x_k(t) - x_k(T)|$")
 
 
-def _known_end(certificate: FamilyCertificate) -> np.ndarray | None:
+def _known_end(certificate: Certificate) -> np.ndarray | None:
     """Return the state at ``T`` if it is proved to be the same for every signal."""
-    ends = [] if certificate.final_states is None else [one for one in certificate.final_states if one is not None]
+    ends = [] if certificate.final_state is None else [one for one in certificate.final_state if one is not None]
     same = len(ends) == certificate.family.n_nodes and all(low == high for low, high in ends)
     return np.array([float(low) for low, _ in ends]) if same else None
 

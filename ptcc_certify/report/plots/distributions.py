@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from ptcc_certify.certificate.certificate_data import Content
+from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled
@@ -17,7 +17,7 @@ _ALIKE, _SMALL = 1e-6, 1e-290
 
 
 @styled
-def plot_final_states(certificate: Content, *, ax: Axes | None = None) -> Axes:
+def plot_final_states(certificate: Certificate, *, ax: Axes | None = None) -> Axes:
     """Draw how many agents end where: a histogram of the final states, followers upon leaders.
 
     Parameters

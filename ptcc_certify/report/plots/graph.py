@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrowPatch, Polygon
 
 from lmi.exact.decimal_rounding import counted
-from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.io.conversion import as_family, is_family
@@ -22,7 +21,7 @@ from ptcc_certify.report.plots.agents import CAMP_STYLES, camp_groups, family_ca
 from ptcc_certify.report.plots.graph_labels import INSIDE, boxes_along, draw_labels, draw_sizes
 from ptcc_certify.report.plots.graph_layout import FREE_NODES, Arrow, places_and_bends, triangles_of
 from ptcc_certify.report.plots.style import EDGE_STYLES, SINGLE_COLUMN, axes_of, finished, styled
-from ptcc_certify.report.plots.subject import structure_of
+from ptcc_certify.report.plots.subject import is_of_family, structure_of
 from ptcc_certify.report.text_layout import columns, printable, shorten_text
 from ptcc_certify.theorems.counterexample_text import mode_name
 
@@ -82,7 +81,7 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
 
     Parameters
     ----------
-    subject : Structure, Certificate, Trajectory, Family, FamilyCertificate, graph-like or family-like
+    subject : Structure, Certificate, Trajectory, Family, graph-like or family-like
         As :func:`ptcc_certify.as_graph` or :func:`ptcc_certify.as_family` takes it: a path, a networkx graph, the name
         of a packaged graph.
     ax : Axes, optional
@@ -101,7 +100,7 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     >>> [text.get_text() for text in ax.texts][:3], len(ax.texts)
     (['a', 'b', 'c'], 5)
     """
-    if isinstance(subject, Family | FamilyCertificate) or is_family(subject):
+    if is_of_family(subject) or is_family(subject):
         return _draw_family(as_family(getattr(subject, "family", subject)), ax)
     structure = structure_of(subject)
     graph = structure.graph

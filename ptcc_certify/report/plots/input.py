@@ -12,7 +12,6 @@ from lmi.exact.decimal_rounding import up
 from ptcc_certify.bounds.envelope import FLOOR_FACTOR
 from ptcc_certify.bounds.input.effort import Effort
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.judgements import largest_late_input
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import analyse
@@ -22,7 +21,7 @@ from ptcc_certify.report.plots.agents_motion import agents_run
 from ptcc_certify.report.plots.peaks import Peak, draw_peaks
 from ptcc_certify.report.plots.runs import bound_label, count_of_signals, is_worst, line_of, runs_of
 from ptcc_certify.report.plots.style import BOUND, RUN, axes_of, finished, styled, time_label
-from ptcc_certify.report.plots.subject import limits_text, require_same, structure_of, trajectory_of
+from ptcc_certify.report.plots.subject import certifies_family, limits_text, require_same, structure_of, trajectory_of
 from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.simulation.members import Members
 from ptcc_certify.simulation.trajectory import Trajectory
@@ -57,7 +56,7 @@ def plot_input(
 
     Parameters
     ----------
-    subject : Certificate, FamilyCertificate, Trajectory or AgentsTrajectory
+    subject : Certificate, Trajectory or AgentsTrajectory
         Of one initial state. The run of a certificate that holds none is simulated.
     ax : Axes, optional
     certificate : Certificate, optional
@@ -86,7 +85,7 @@ def plot_input(
     ('input $|u_k|$', 'certified peak 16.01')
     """
     ax, x = axes_of(ax), time_label("time $t$", time_unit)
-    if isinstance(subject, FamilyCertificate):
+    if certifies_family(subject):
         runs = runs_of(subject, runs)
         _draw_signals(ax, subject, runs)
         draw_deadlines(ax, runs[0])
@@ -114,7 +113,7 @@ def plot_input(
     return finished(ax, x, name, title)
 
 
-def _draw_signals(ax: Axes, certificate: FamilyCertificate, runs: Sequence[Trajectory]) -> None:
+def _draw_signals(ax: Axes, certificate: Certificate, runs: Sequence[Trajectory]) -> None:
     """Draw the largest input under many signals below its bound for every signal, and the proved peak."""
     first, gain = runs[0], certificate.protocol.gain
     before = first.remaining > 0

@@ -6,13 +6,13 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from ptcc_certify.certificate.family_certificate import FamilyCertificate
+from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_comparison import worst_case_signals
 from ptcc_certify.errors import Change, ParameterError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.model.restricted_signals import ClockShares, DwellTime, JointWindows
 from ptcc_certify.report.plots.style import RUN
-from ptcc_certify.report.plots.subject import trajectory_of
+from ptcc_certify.report.plots.subject import certifies_family, trajectory_of
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import ConstantSignal, PeriodicSignal, RandomDwellSignal, RandomSignal, Signal
 from ptcc_certify.simulation.trajectory import Trajectory
@@ -25,12 +25,12 @@ _PERIODS = (0.25, 0.5, 1.0, 2.0, 4.0)
 _SAMPLES = 101
 
 
-def sample_runs(certificate: FamilyCertificate, signals: Iterable[Signal] | None = None) -> list[Trajectory]:
+def sample_runs(certificate: Certificate, signals: Iterable[Signal] | None = None) -> list[Trajectory]:
     """Return runs from a certificate's initial state.
 
     Parameters
     ----------
-    certificate : FamilyCertificate
+    certificate : Certificate
     signals : iterable of Signal, optional
         By default eight random ones, and worst cases; of a certificate for constant signals, a dwell time, shares or
         windows signals of that kind.
@@ -50,12 +50,12 @@ def sample_runs(certificate: FamilyCertificate, signals: Iterable[Signal] | None
     return [simulate(certificate.family, certificate.protocol, start, signal, **more) for signal in chosen]
 
 
-def _signals(certificate: FamilyCertificate) -> list[Signal]:
+def _signals(certificate: Certificate) -> list[Signal]:
     """Return signals of the kind that was asked for; where that is any random ones, and worst cases."""
     return _of_the_kind(certificate) or [*map(RandomSignal, range(_RANDOM)), *worst_case_signals(certificate)]
 
 
-def _of_the_kind(certificate: FamilyCertificate) -> list[Signal]:
+def _of_the_kind(certificate: Certificate) -> list[Signal]:
     """Return signals that keep what a certificate was asked of; none where that is any, or where none is known."""
     signal, modes = certificate.signal, certificate.family.modes
     if isinstance(signal, DwellTime):
@@ -73,7 +73,7 @@ def _of_the_kind(certificate: FamilyCertificate) -> list[Signal]:
     return []
 
 
-def keeps_promise(certificate: FamilyCertificate, runs: Sequence[Trajectory]) -> bool:
+def keeps_promise(certificate: Certificate, runs: Sequence[Trajectory]) -> bool:
     """Tell whether runs are those under signals of the kind that a certificate was asked of."""
     own = {signal.text for signal in _of_the_kind(certificate)}
     return all(run.signal in own for run in runs)
@@ -87,7 +87,7 @@ def runs_of(subject: Any, runs: Sequence[Trajectory] | None = None) -> list[Traj
     ParameterError
         The subject leads to no run, or runs are given that are not of its family.
     """
-    if not isinstance(subject, FamilyCertificate):
+    if not certifies_family(subject):
         if runs is not None:
             raise ParameterError("runs are of the certificate of a family; leave them out")
         return [trajectory_of(subject)]
@@ -104,12 +104,12 @@ def _is_of(run: Any, family: Family) -> bool:
     return isinstance(run, Trajectory) and run.played is not None and run.played.family == family
 
 
-def bound_label(certificate: FamilyCertificate) -> str:
+def bound_label(certificate: Certificate) -> str:
     """Name bounds for every signal; while sliding variables move they are integrated in floats: numerical."""
     return "proved for every signal" if certificate.direct else "bound for every signal (numerical)"
 
 
-def count_of_signals(certificate: FamilyCertificate, runs: Sequence[Trajectory]) -> str:
+def count_of_signals(certificate: Certificate, runs: Sequence[Trajectory]) -> str:
     """Tell how many signals are drawn, and where some are promised, whether these keep the promise or are any."""
     kept = " of the kind asked for" if keeps_promise(certificate, runs) else " of any kind"
     return f"{len(runs)} signals{'' if certificate.signal == 'any' else kept}"

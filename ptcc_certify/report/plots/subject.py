@@ -10,7 +10,6 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import near
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
-from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import as_graph
@@ -40,6 +39,23 @@ def read_back(subject: Any) -> Any:
     return subject
 
 
+def is_of_family(subject: Any) -> bool:
+    """Tell whether a subject is a family, or the certificate of one."""
+    return isinstance(subject, Family) or certifies_family(subject)
+
+
+def certifies_family(subject: Any) -> bool:
+    """Tell whether a subject is the certificate of a family.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.subject import certifies_family
+    >>> certifies_family(certify([("a", "b", 1, 2)], NominalProtocol())), certifies_family("fig1a")
+    (True, False)
+    """
+    return isinstance(subject, Certificate) and subject.of_family
+
+
 def refuse_family(subject: Any) -> None:
     """Refuse a family, or its certificate, where the figure is of one graph.
 
@@ -55,7 +71,7 @@ def refuse_family(subject: Any) -> None:
     Traceback (most recent call last):
     ptcc_certify.errors.ParameterError: this figure is of one graph; of families draw plot_graph, and of their ...
     """
-    if isinstance(subject, Family | FamilyCertificate):
+    if is_of_family(subject):
         others = "of their certificates plot_trajectory, plot_decay and plot_input"
         raise ParameterError(f"this figure is of one graph; of families draw plot_graph, and {others}")
 

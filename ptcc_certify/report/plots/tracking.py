@@ -10,10 +10,9 @@ from matplotlib.axes import Axes
 from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.bounds.tracking import Tracking
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.errors import Change, ParameterError
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
-from ptcc_certify.report.plots.subject import certificate_of
+from ptcc_certify.report.plots.subject import certificate_of, certifies_family
 from ptcc_certify.simulation.late_messages import can_run, simulate_late
 from ptcc_certify.simulation.moving_leaders import simulate_tracking
 from ptcc_certify.simulation.trajectory import Trajectory
@@ -37,7 +36,7 @@ def plot_tracking(subject: Any, *, ax: Axes | None = None, time_unit: str = "") 
 
     Parameters
     ----------
-    subject : Certificate or FamilyCertificate
+    subject : Certificate
         With late messages or moving leaders, and an initial state; of a family the bound is drawn alone.
     ax : Axes, optional
     time_unit : str
@@ -63,7 +62,7 @@ def plot_tracking(subject: Any, *, ax: Axes | None = None, time_unit: str = "") 
     >>> [line.get_label() for line in plot_tracking(cert).lines]
     ['worst leaders', 'proved bound', '$T$']
     """
-    certificate = subject if isinstance(subject, FamilyCertificate) else certificate_of(subject)
+    certificate = subject if certifies_family(subject) else certificate_of(subject)
     late, tracking, x0 = certificate.late, certificate.tracking, certificate.initial_state
     late = late if late is not None and late.says_something else None
     if late is None and tracking is None:
@@ -71,7 +70,7 @@ def plot_tracking(subject: Any, *, ax: Axes | None = None, time_unit: str = "") 
         raise ParameterError((what, Change("delay"), " or ", Change("leader_speed")))
     ax, T = axes_of(ax), float(certificate.protocol.T)
     t = np.linspace(0, T, 401)
-    if isinstance(certificate, Certificate):
+    if not certificate.of_family:
         if x0 is None or (late is not None and certificate.final_state is None):
             raise ParameterError("the certificate has no initial state to run from; certify with x0")
         t = _draw_runs(ax, certificate, late, [float(x) for x in x0])

@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS
 from ptcc_certify.model.reaching_time import ReachingTime
@@ -36,7 +35,7 @@ from ptcc_certify.report.plots.style import (
     styled,
     time_label,
 )
-from ptcc_certify.report.plots.subject import limits_text, structure_of, trajectory_of
+from ptcc_certify.report.plots.subject import certifies_family, limits_text, structure_of, trajectory_of
 from ptcc_certify.simulation.trajectory import Trajectory
 
 #: The bar of a final interval.
@@ -61,7 +60,7 @@ def plot_trajectory(
 
     Parameters
     ----------
-    subject : Trajectory, Certificate or FamilyCertificate
+    subject : Trajectory, Certificate
         Of one initial state. The run of a certificate that holds none is simulated.
     ax : Axes, optional
     runs : sequence of Trajectory, optional
@@ -88,7 +87,7 @@ def plot_trajectory(
     """
     every, ax = runs_of(subject, runs), axes_of(ax)
     run, values = every[0], every[0].positions
-    if isinstance(subject, FamilyCertificate):
+    if certifies_family(subject):
         named, limits = _draw_signals(ax, subject, every)
         title = count_of_signals(subject, every)
     else:
@@ -102,7 +101,7 @@ def plot_trajectory(
 
 
 def _draw_signals(
-    ax: Axes, certificate: FamilyCertificate, runs: Sequence[Trajectory]
+    ax: Axes, certificate: Certificate, runs: Sequence[Trajectory]
 ) -> tuple[dict[int, str], tuple[float, float]]:
     """Draw runs of a family within what is proved for every signal; return the colours of agents, and the limits."""
     groups = family_camps(certificate.family)
@@ -134,12 +133,12 @@ def _extreme_agents(x: np.ndarray) -> list[int]:
 
 
 def _draw_tubes(
-    ax: Axes, certificate: FamilyCertificate, run: Trajectory, agents: list[int], groups: np.ndarray
+    ax: Axes, certificate: Certificate, run: Trajectory, agents: list[int], groups: np.ndarray
 ) -> list[float]:
     """Shade where the agents of each camp are for every signal; draw the final intervals beyond ``T``, return ends."""
     before = run.remaining > 0
     moves = certificate.deviation_bound(run.remaining[before])
-    finals = certificate.final_states or ()
+    finals = certificate.final_state or ()
     largest = np.zeros(len(groups))  # what the states of a component never exceed
     for part in certificate.parts:
         nodes = part.component.nodes

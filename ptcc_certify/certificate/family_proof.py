@@ -1,11 +1,10 @@
-"""What a certificate of a family holds, and what follows: behaviours, rates, bounds for every signal.
+"""What is proved of a family, and what follows: behaviours, rates, bounds for every signal.
 
 Nothing here writes, reads or checks.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -26,13 +25,10 @@ from ptcc_certify.bounds.family_deviation import (
 from ptcc_certify.bounds.final_ends import FinalEnds
 from ptcc_certify.bounds.heard_deviation import HeardRows
 from ptcc_certify.bounds.kept_means import LeadingGroup, leading_groups
-from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.bounds.reaching_phase import ReachingPhase
-from ptcc_certify.bounds.tracking import Tracking
 from ptcc_certify.bounds.undriven_part import FunctionOf, UndrivenPart
-from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.functions import ProvedFunction
-from ptcc_certify.certificate.request import Expectations
+from ptcc_certify.certificate.proof import Proof
 from ptcc_certify.certificate.restricted_claims import (
     Claim,
     FinalValueClaim,
@@ -57,10 +53,6 @@ from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound
 from ptcc_certify.lyapunov.follower_function import FollowerFunction
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.squares_function import SquaresFunction
-from ptcc_certify.model import Protocol
-from ptcc_certify.model.late_messages import LateMessages
-from ptcc_certify.model.moving_leaders import MovingLeaders
-from ptcc_certify.model.reaching_time import ReachingTime
 from ptcc_certify.model.restricted_signals import SignalClass
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 from ptcc_certify.theorems.family_kernel import UNKNOWN
@@ -168,45 +160,40 @@ class BoundFunction:
 AnyBoundFunction = BoundFunction | FollowerFunction | SquaresFunction
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class FamilyContent:
-    """The parts of a certificate of a family, and what follows from them."""
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class FamilyProof(Proof):
+    """What is proved of a family of graphs, and what follows.
 
-    family: Family
-    protocol: Protocol
+    Attributes
+    ----------
+    parts : tuple of ComponentProof
+        One for each weakly connected component of all edges of all modes.
+    restricted : tuple of Claim
+        What holds for the signals that were asked for, beside what holds for every signal.
+    boxes : mapping of int to AttractingBox
+        Where every signal brings the followers of components that depend on it, by the numbers of these.
+    ranges : mapping of int to tuple of (Fraction, Fraction)
+        Between which ends every signal keeps each agent of these components, at all times.
+    """
+
     parts: tuple[ComponentProof, ...]
-    initial_state: tuple[Fraction, ...] | None = None
-    sigma0: tuple[Fraction, ...] | None = None
-    reaching: tuple[ReachingTime, ...] | None = None
-    disturbance: str | None = None
-    expectations: Expectations = field(default_factory=Expectations)
-    notes: tuple[str, ...] = ()
-    source: Source | None = None
-    origins: Mapping[str, str] = field(default_factory=dict)
-    scenario: Mapping[str, Any] | None = None
-    signal: SignalClass = "any"
     restricted: tuple[Claim, ...] = ()
     boxes: Mapping[int, AttractingBox] = field(default_factory=dict)
     ranges: Mapping[int, tuple[Interval, ...]] = field(default_factory=dict)
-    late: LateBounds | None = None
-    tracking: Tracking | None = None
-    asked_leaders: MovingLeaders | None = None
 
-    # What a certificate of one graph may have beside that, and none of a family has.
-    agents = offsets = initial_set = noise = delta = trajectory = at = None
-    limits = cut_off = ()
-    time_limit = math.inf
-    only_drawn = violated = False
+    #: Agents of order n and formations are of one graph.
+    agents = offsets = None
 
     @property
-    def labels(self) -> Sequence[str]:
-        """The names of the agents."""
-        return self.family.labels
+    def family(self) -> Family:
+        """The family."""
+        assert isinstance(self.question.subject, Family)
+        return self.question.subject
 
     @property
-    def asked_messages(self) -> LateMessages | None:
-        """How late messages are."""
-        return None if self.late is None else self.late.messages
+    def signal(self) -> SignalClass:
+        """The signals that it was asked for."""
+        return self.request.signal
 
     @property
     def leaders_move(self) -> bool:
@@ -214,11 +201,37 @@ class FamilyContent:
         return self.asked_leaders is not None
 
     @property
+    def checkable(self) -> bool:
+        """Whether every behaviour is decided, and takes few enough rows to be written."""
+        return all(part.certifiable for part in self.parts)
+
+    @property
+    def headline(self) -> str:
+        """Behaviour in a few words."""
+        behaviour = self.parts[0].component.behaviour or "not decided"
+        if len(self.parts) > 1:
+            return f"{len(self.parts):,} components"
+        return behaviour + (" for every signal" if behaviour in self.behaviours and behaviour != DEPENDS else "")
+
+    @property
+    def main_figure(self) -> str:
+        """The figure that is drawn where none is named: the decay, or the states where nothing of one is proved.
+
+        With late messages what is left, while leaders move how they are tracked.
+        """
+        if self.late is not None:
+            return "late" if self.late.rows else "graph"
+        if self.leaders_move:
+            return "graph" if self.tracking is None else "tracking"
+        nothing = self.initial_state is not None and not np.isfinite(self.deviation_bound([0.5])).any()
+        return "states" if nothing else "decay"
+
+    @property
     def longest_way(self) -> float | None:
         """The longest way of an agent from its initial to its final state (numerical); None if unknown."""
-        if self.initial_state is None or self.final_states is None:
+        if self.initial_state is None or self.final_state is None:
             return None
-        pairs = zip(self.initial_state, self.final_states, strict=True)
+        pairs = zip(self.initial_state, self.final_state, strict=True)
         return max((float(max(abs(x - y) for y in ends)) for x, ends in pairs if ends is not None), default=None)
 
     @property
@@ -299,11 +312,6 @@ class FamilyContent:
     # ------------------------------------------------------------------ bounds
 
     @property
-    def direct(self) -> bool:
-        """Whether no sliding variable moves: the agents move as without disturbances."""
-        return self.sigma0 is None or not any(self.sigma0)
-
-    @property
     def settling_share(self) -> float:
         """The share of ``T`` in which no sliding variable moves: ``T_s / T``, or 1."""
         return 1.0 if self.direct else float(self.protocol.span / self.protocol.T)
@@ -354,10 +362,10 @@ class FamilyContent:
         )
 
     @cached_property
-    def final_states(self) -> FinalEnds | None:
+    def final_state(self) -> FinalEnds | None:
         """Ends between which each agent is at the deadline, for every signal; None where no limit is claimed.
 
-        By place, or by label: ``final_states["ann"]``.
+        By place, or by label: ``final_state["ann"]``.
         """
         if self.initial_state is None:
             return None
@@ -506,7 +514,7 @@ class FamilyContent:
     def _undriven(self, part: ComponentProof, functions: Sequence[AnyBoundFunction]) -> UndrivenPart:
         """Return a component with its functions, those of parts that others follow included."""
         rows = HeardRows.of(part.component.family)
-        finals = None if rows is None else self.final_states  # of large families they take long
+        finals = None if rows is None else self.final_state  # of large families they take long
         ends = [] if finals is None else [finals[v] for v in part.component.nodes.tolist()]
         known = [pair for pair in ends if pair is not None]
         everybody = np.arange(part.component.nodes.size)

@@ -1,0 +1,297 @@
+"""The steps of ``certify`` for a family of graphs: what every signal does, proved.
+
+A family of one mode with known weights is a graph, and :func:`ptcc_certify.certify` certifies it as one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from lmi import search_time as deadline
+from lmi.errors import NoCertificate
+from lmi.exact.decimal_rounding import counted
+from lmi.search_time import share_of_time
+from ptcc_certify.bounds.attracting_box import AttractingBox, box_of_family
+from ptcc_certify.bounds.envelope import FRACTIONS
+from ptcc_certify.bounds.kept_means import with_means
+from ptcc_certify.bounds.late_messages import bound_late
+from ptcc_certify.bounds.tracking import bound_tracking
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.evidence import Observations
+from ptcc_certify.certificate.family_proof import ComponentProof, FamilyProof
+from ptcc_certify.certificate.functions import ProvedFunction
+from ptcc_certify.certificate.request import Question
+from ptcc_certify.certificate.restricted_claims import RateClaim
+from ptcc_certify.certificate.restricted_search import STEP, claims_for, require_nominal
+from ptcc_certify.checker.family import MANY_MODES
+from ptcc_certify.checker.family_rows import MANY_FUNCTIONS
+from ptcc_certify.checker.matrix_products import LARGEST_ROWS
+from ptcc_certify.checker.reading import Interval
+from ptcc_certify.checker.restricted_signals import reachable_bounds
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.family import Family
+from ptcc_certify.graphs.rationals import nearest_float
+from ptcc_certify.graphs.size_limits import EXACT_NODES
+from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
+from ptcc_certify.lyapunov.aimed_forms import Aim, aimed_functions
+from ptcc_certify.lyapunov.family_function import FamilyFunction
+from ptcc_certify.lyapunov.family_rate_upper_bound import prove_family_rate_bound
+from ptcc_certify.lyapunov.family_search import CLOSED_ROWS, FULL_ROWS, FamilySearch, search_family
+from ptcc_certify.lyapunov.follower_function import LOSSES, FollowerFunction, follower_functions
+from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.squares_function import SquaresFunction, squares_function
+from ptcc_certify.model import Protocol
+from ptcc_certify.model.case import Case
+from ptcc_certify.model.reaching_time import ReachingTime
+from ptcc_certify.model.restricted_signals import ClockShares, JointWindows, read_signal
+from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, decide
+from ptcc_certify.theorems.joint_windows import refuse_impossible_windows
+
+STEPS = ("the decision", "upper bound on the decay rate", "Lyapunov functions", STEP, "independent check")
+BOXES = "boxes of followers"
+#: Share of the upper bound that ends the search, and share of the time that the bound may take at first.
+_ENOUGH, _BOUND_SHARE = Fraction(99, 100), 0.3
+#: Agents and edges of a component up to which ends are told between which each agent stays.
+_MANY = 200_000
+
+
+def refuse_signals(family: Family, case: Case) -> None:
+    """Refuse more modes than a certificate holds, and restricted signals that the family or the protocol does not take.
+
+    Raises
+    ------
+    ParameterError
+        Tells which.
+    """
+    if len(family.modes) > MANY_MODES:
+        mend = "put modes whose edges have the same signs into one, with intervals that hold them all; ptcc classify"
+        raise ParameterError(
+            f"{len(family.modes):,} modes, and a certificate holds {MANY_MODES:,} at most; {mend} and decide take any"
+        )
+    signal = read_signal(case.signal)
+    require_nominal(signal, case.protocol)
+    if isinstance(signal, JointWindows):
+        refuse_impossible_windows(family, signal)
+    if isinstance(signal, ClockShares) and len(signal.shares) != len(family.modes):
+        shares = counted(len(signal.shares), "share")
+        raise ParameterError(f"{shares} of the clock; give one for each of {len(family.modes)} modes")
+
+
+def certify_family(
+    family: Family,
+    question: Question,
+    reaching: tuple[ReachingTime, ...] | None,
+    progress: Callable[[str], None],
+) -> Certificate:
+    """Take the steps for a family: what every signal does, proved, with what more is proved for those asked for.
+
+    Parameters
+    ----------
+    family : Family
+        The subject of the question.
+    question : Question
+    reaching : tuple of N ReachingTime, or None
+    progress : callable
+        Is told each of :data:`STEPS` as it begins.
+
+    Raises
+    ------
+    ParameterError
+        Sliding variables move where messages are late, or leaders move.
+    HypothesisError
+        Where followers are drawn to depends on the signal, or leaders hear somebody in some mode, in such a case.
+    """
+    progress(STEPS[0])
+    components, request = decide(family), question.request
+    parts, notes = [], list(family.notes)
+    still = not any(question.sigma0 or ())
+    begin = question.initial_state if still else None
+    with deadline.time_limit(request.time_limit, work=request.by_work):
+        for component in components:
+            part = _prove(component, notes, progress, question.protocol, begin)
+            parts.append(part if begin is None else _with_means(part))
+        if request.signal != "any":
+            progress(STEP)
+        proof = FamilyProof(
+            question=question,
+            reaching=reaching,
+            parts=tuple(parts),
+            boxes=_boxes(parts, begin, notes),
+            ranges=_ranges(parts, begin),
+            restricted=claims_for(
+                request.signal, parts, question.protocol, begin, notes, request.expectations.min_rate
+            ),
+        )
+    progress(STEPS[-1])
+    notes = [f"{note}: cut off by the time limit" if note in (*STEPS, BOXES) else note for note in notes]
+    certificate = _fewer_functions(Certificate(proof, Observations(notes=tuple(dict.fromkeys(notes)))))
+    beside = _beside(certificate.family_proof)
+    return certificate.changed(**beside) if beside else certificate
+
+
+def _beside(proof: FamilyProof) -> dict[str, Any]:
+    """Return what is proved for every signal where messages are late, or leaders move."""
+    messages, leaders, state = proof.request.messages, proof.request.leaders, proof.initial_state
+    if messages is None and leaders is None:
+        return {}
+    if not proof.direct:
+        raise ParameterError("sigma0", "late messages ask for 0, so that no sliding variable moves; leave it out")
+    known = [pair for pair in proof.final_state or () if pair is not None]
+    middles = [((low + high) / 2, (high - low) / 2) for low, high in known]
+    ends = middles if len(known) == proof.family.n_nodes else None
+    if messages is not None:
+        return {"late": bound_late(proof.family, proof.protocol, messages, state, ends, leaders)}
+    with suppress(NoCertificate):
+        assert leaders is not None
+        return {"tracking": bound_tracking(proof.family, proof.protocol, leaders, state, ends)}
+    return {}
+
+
+def _fewer_functions(certificate: Certificate) -> Certificate:
+    """Leave out functions, slower ones first, that the check refuses since they are many or their proofs large.
+
+    Claims for restricted signals that rest on a function left out are left out with it.
+    """
+    parts = certificate.family_proof.parts
+    functions = [(part, V) for part in parts for V in part.functions if isinstance(V, FamilyFunction)]
+    work = sum((len(V.nodes) + len(tau)) ** 3 for _, V in functions for tau in V.multipliers)
+    few = sum(len(part.functions) for part in parts) <= MANY_FUNCTIONS
+    if (few and work <= LARGEST_ROWS**3) or not certificate.proof.checkable:
+        return certificate
+    for most in (1, 0):
+        report = certificate.checked
+        if report is None or report.accepted:
+            break
+        note = f"the independent check does not take all functions that were found: {report.reason}"
+        claims = certificate.family_proof.restricted
+        certificate = certificate.changed(
+            parts=tuple(replace(part, functions=part.functions[:most]) for part in certificate.family_proof.parts),
+            restricted=tuple(c for c in claims if most or not (isinstance(c, RateClaim) and c.forms is None)),
+            notes=tuple(dict.fromkeys((*certificate.observed.notes, note))),
+        )
+    return certificate
+
+
+def _boxes(
+    parts: Sequence[ComponentProof], state: Sequence[Fraction] | None, notes: list[str]
+) -> dict[int, AttractingBox]:
+    """Return the boxes of components that depend on the signal and have followers."""
+    boxes: dict[int, AttractingBox] = {}
+    if state is None:
+        return boxes
+    for number, part in enumerate(parts):
+        if part.component.behaviour == DEPENDS:
+            with share_of_time(1.0, BOXES, notes):
+                x = [state[v] for v in part.component.nodes.tolist()]
+                if (box := box_of_family(part.component.family, x)) is not None:
+                    boxes[number] = box
+    return boxes
+
+
+def _ranges(parts: Sequence[ComponentProof], state: Sequence[Fraction] | None) -> dict[int, tuple[Interval, ...]]:
+    """Return of components that depend on the signal between which ends each agent stays at all times."""
+    ranges: dict[int, tuple[Interval, ...]] = {}
+    for number, part in enumerate(parts if state is not None else ()):
+        component = part.component
+        if component.behaviour == DEPENDS and component.family.n_nodes + component.family.union[0].size <= _MANY:
+            edges = zip(*(end.tolist() for end in component.family.union), strict=True)
+            x = [state[v] for v in component.nodes.tolist()]  # type: ignore[index]
+            ranges[number] = tuple(reachable_bounds(range(len(x)), edges, x).values())
+    return ranges
+
+
+def _with_means(part: ComponentProof) -> ComponentProof:
+    """Add weighted means to the functions, where groups of leaders keep none exactly."""
+    if all(group.vector is not None for group in part.leading_groups):
+        return part
+    forms = {k: V for k, V in enumerate(part.functions) if isinstance(V, FamilyFunction)}
+    quotient = Quotient.of(part.component) if forms else None
+    functions = list(part.functions)
+    for k, V in forms.items():
+        assert quotient is not None
+        functions[k] = with_means(V, quotient, part.leading_groups)
+    return replace(part, functions=tuple(functions))
+
+
+def _squares(component: FamilyComponent, notes: list[str] | None = None) -> list[SquaresFunction]:
+    """Return the weighted sum of squares of a component whose agents end at 0, if one is proved."""
+    if component.behaviour != STABILITY:
+        return []
+    found = squares_function(component.family, notes)
+    return [] if found is None else [found]
+
+
+def _dense(component: FamilyComponent, notes: list[str]) -> tuple[ProvedFunction, ...]:
+    """Return a dense form of a component of some hundreds of agents, if one is proved."""
+    if component.nodes.size > CLOSED_ROWS or component.behaviour not in (STABILITY, BIPARTITE_CONSENSUS):
+        return ()
+    search = search_family(Quotient.of(component), ["full"])
+    notes += search.notes
+    return search.functions
+
+
+def _led(component: FamilyComponent) -> list[FollowerFunction]:
+    """Return a function of rows if small parts lead in which something moves, for the rates of these parts."""
+    found = follower_functions(component, LOSSES[:1], largest_part=component.nodes.size // 2)
+    return [W for W in found if W.parts]
+
+
+def _aim(quotient: Quotient, protocol: Protocol, x: Sequence[Fraction]) -> Aim | None:
+    """Return where bounds should be small: at the instants that are reported; None where other functions serve."""
+    begin = quotient.coordinates(x)
+    if not (1 < len(begin) <= FULL_ROWS and any(begin)):
+        return None
+    top = max(map(abs, begin))
+    clocks = protocol.gain.clock_at_remaining([1 - fraction for fraction in FRACTIONS])
+    return Aim(np.array([nearest_float(xi / top) for xi in begin]), np.asarray(clocks))
+
+
+def _prove(
+    component: FamilyComponent,
+    notes: list[str],
+    progress: Callable[[str], None],
+    protocol: Protocol,
+    state: Sequence[Fraction] | None,
+) -> ComponentProof:
+    bare = ComponentProof(component)
+    if component.kernel is None or component.nodes.size == 1 or not bare.certifiable:
+        return bare
+    if component.nodes.size > EXACT_NODES:
+        progress(STEPS[2])
+        functions: list[ProvedFunction] = []
+        with share_of_time(1.0, STEPS[2], notes):
+            functions += follower_functions(component, notes=notes)
+            functions += _squares(component, notes) if not functions else []
+            functions += _dense(component, notes) if not functions else []
+        return ComponentProof(component, tuple(functions))
+    quotient = Quotient.of(component)
+    bound, search = None, FamilySearch()
+    progress(STEPS[1])
+    with share_of_time(_BOUND_SHARE, STEPS[1], notes):
+        bound = prove_family_rate_bound(quotient)
+    progress(STEPS[2])
+    squares: list[SquaresFunction] = []
+    aimed: list[ProvedFunction] = []
+    aim = None if state is None else _aim(quotient, protocol, [state[v] for v in component.nodes.tolist()])
+    with share_of_time(1.0, STEPS[2], notes):
+        squares = _squares(component)  # which takes no time to speak of
+        enough = None if bound is None else _ENOUGH * bound.value
+        search = search_family(quotient, enough=enough, slower=aim is None)
+        for V in () if aim is None else aimed_functions(quotient, aim, search.functions, notes):
+            aimed.append(V)  # kept, whatever comes after
+        aimed += [] if aim is None else _led(component)
+    notes += [*search.notes, *(f"{name}: cut off by the time limit" for name in search.cut_off)]
+    rate = max((V.rate for V in search.functions), default=Fraction(0))
+    if bound is not None and search.functions and rate < _ENOUGH * bound.value:
+        with share_of_time(1.0, STEPS[1], notes):  # signals played against what was found
+            again = prove_family_rate_bound(quotient, search.functions)
+            bound = bound if again is None else min(bound, again, key=lambda b: b.value)
+    better = [V for V in squares if _ENOUGH * V.rate > rate]
+    functions = sorted((*search.functions, *aimed), key=lambda V: -V.rate)
+    return ComponentProof(component, (*better, *functions), bound)

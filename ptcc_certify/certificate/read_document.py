@@ -1,0 +1,184 @@
+"""Reads a certificate back from a file that the independent check accepts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ptcc_certify.bounds.input.effort import read_effort
+from ptcc_certify.bounds.late_messages import read_late
+from ptcc_certify.bounds.section_numbers import fractions
+from ptcc_certify.bounds.tracking import read_tracking
+from ptcc_certify.certificate.agents_answer import AgentsAnswer, rows_of
+from ptcc_certify.certificate.agents_part import read_matrix
+from ptcc_certify.certificate.cascade_part import read_cascade
+from ptcc_certify.certificate.claim_sections import read_claim
+from ptcc_certify.certificate.evidence import Observations
+from ptcc_certify.certificate.family_proof import ComponentProof, FamilyProof
+from ptcc_certify.certificate.final_state_sections import read_final_state
+from ptcc_certify.certificate.functions import ProvedFunction, _read_function, _read_limit, read_box, read_function
+from ptcc_certify.certificate.graph_proof import GraphProof
+from ptcc_certify.certificate.graph_sections import certificate_family, certificate_graph
+from ptcc_certify.certificate.proof import Source
+from ptcc_certify.certificate.request import Question
+from ptcc_certify.certificate.section_writer import Reader
+from ptcc_certify.certificate.unverified import (
+    nothing_proved,
+    read_observations,
+    read_request,
+    read_unproved,
+    read_upper_bound,
+)
+from ptcc_certify.checker import CheckReport
+from ptcc_certify.checker.agent_cascade import CascadeSection
+from ptcc_certify.checker.agents import AgentsSection
+from ptcc_certify.checker.attracting_boxes import AttractingBox, KeptBox
+from ptcc_certify.checker.protocol import NominalSection, ReachingTimes, SlidingSection
+from ptcc_certify.checker.side_files import SideFiles
+from ptcc_certify.checker.theorem_function import PaperSection
+from ptcc_certify.graphs.family import Family
+from ptcc_certify.graphs.structure import Structure, analyse
+from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound
+from ptcc_certify.lyapunov.function import LyapunovFunction
+from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.model import Protocol
+from ptcc_certify.model.reaching_time import ReachingTime
+from ptcc_certify.theorems.agent_decrease import Phase
+from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
+from ptcc_certify.theorems.theorem import ExactInterval, Obligation, RateProof
+
+
+def read_document(source: Source) -> tuple[GraphProof | FamilyProof, Observations]:
+    """Return what an accepted file proves, and what it says of searches; structures and decisions are made anew."""
+    document, sections = source.document, source.report.sections
+    protocol, state = read_protocol(sections["protocol"]), fractions(sections["initial_state"])
+    subject: Structure | Family
+    if of_family := "modes" in document["graph"]:
+        subject, effort = certificate_family(document["graph"], source.files), None
+    else:
+        subject = analyse(certificate_graph(document, source.files))
+        effort = read_effort(source.report, subject, protocol, state)
+    request = read_request(document["unverified"], None if effort is None else effort.initial_set, not of_family)
+    request = replace(request, **read_unproved(document, subject))
+    relative = state is None if isinstance(subject, Family) else sections["final_state"] is None
+    late = read_late(source.report, subject, protocol, relative)
+    words: dict[str, Any] = {
+        "question": Question(subject, protocol, state, fractions(sections["sliding_variable"]), request),
+        "reaching": read_reaching(sections.get("reaching_time"), protocol),
+        "late": late or nothing_proved(request.messages, request.leaders, subject, protocol, state is None),
+        "tracking": read_tracking(source.report, subject, protocol, relative),
+        "source": replace(source, effort=effort),
+    }
+    if isinstance(subject, Family):
+        return _read_family_proof(source, subject, words), Observations()
+    return _read_graph_proof(source, subject, words), read_observations(document["unverified"])
+
+
+def _read_graph_proof(source: Source, structure: Structure, words: dict[str, Any]) -> GraphProof:
+    """Return what is proved of one graph; ``words`` are the fields that proofs of families have, too."""
+    report, data = source.report, Reader(structure.graph.labels, source.files)
+    sections, proved = report.sections, report.proved
+    paper: PaperSection | None = sections["paper"]
+    functions = [
+        _read_function(f"lyapunov.functions[{k}]", section, structure, data, proved)
+        for k, section in enumerate(sections["lyapunov"].functions)
+    ]
+    lyapunov = next((replace(V, objective=paper.objective) for V in functions if paper and V.kind == "paper"), None)
+    rho = None
+    if paper is not None and paper.rho_interval is not None:
+        rho = ExactInterval(paper.rho_interval.printed, paper.rho_interval.exact)
+    obligations = tuple(
+        Obligation(kind, of, {key: x for key, x in step.items() if key != "witness"})
+        for (kind, of), step in proved.items()
+        if of.split(".")[0] == "paper"
+    )
+    return GraphProof(
+        lyapunov=lyapunov,
+        paper_proof=RateProof(None if lyapunov is None else lyapunov.rate, obligations, rho),
+        searched_functions=tuple(V for V in functions if V.kind != "paper"),
+        limit=_read_limit(proved, data),
+        final_state=read_final_state(report, structure),
+        matrix=None,
+        agents=read_agents(report, structure, words["question"].protocol, functions),
+        offsets=tuple(sections["formation"].offsets) if "formation" in sections else None,
+        **words,
+    )
+
+
+def _read_family_proof(source: Source, family: Family, words: dict[str, Any]) -> FamilyProof:
+    """Return what is proved of a family; each upper bound on the rate is proved anew from members that are named."""
+    document, sections, proved = source.document, source.report.sections, source.report.proved
+    claims = [document["claim"]] if document["claim"] is not None else [c["claim"] for c in document["components"]]
+    components = [
+        component if component.behaviour == claim["behaviour"] else replace(component, behaviour=claim["behaviour"])
+        for component, claim in zip(decide(family), claims, strict=True)
+    ]
+    files = SideFiles(Path(), source.files)
+    functions: list[list[ProvedFunction]] = [[] for _ in components]
+    for k, section in enumerate(sections["lyapunov"].functions):
+        V = read_function(f"lyapunov.functions[{k}]", section, components[section.component], proved, files)
+        functions[section.component].append(V)
+    bounds = _read_bounds(document["unverified"].get("upper_bounds"), components)
+    restricted = tuple(
+        read_claim(f"restricted[{k}]", entry, proved, components)
+        for k, entry in enumerate(sections.get("restricted", ()))
+    )
+    signal = restricted[0].signal if restricted else "any"
+    question = words.pop("question")
+    boxes = sections.get("boxes", ())
+    return FamilyProof(
+        question=replace(question, request=replace(question.request, signal=signal)),
+        parts=tuple(ComponentProof(c, tuple(V), b) for c, V, b in zip(components, functions, bounds, strict=True)),
+        restricted=restricted,
+        boxes={
+            entry.component: read_box(entry, components[entry.component].family.labels, files)
+            for entry in boxes
+            if isinstance(entry, AttractingBox)
+        },
+        ranges={
+            entry.component: tuple(zip(entry.lower, entry.upper, strict=True))
+            for entry in boxes
+            if isinstance(entry, KeptBox)
+        },
+        **words,
+    )
+
+
+def _read_bounds(stated: Any, components: Sequence[FamilyComponent]) -> list[FamilyRateBound | None]:
+    """Prove the upper bounds anew that a file states, one for each component."""
+    entries = stated if isinstance(stated, list) and len(stated) == len(components) else [None] * len(components)
+    return [
+        None if entry is None or component.kernel is None else read_upper_bound(Quotient.of(component), entry)
+        for entry, component in zip(entries, components, strict=True)
+    ]
+
+
+def read_agents(
+    report: CheckReport, structure: Structure, base: Protocol, functions: Sequence[LyapunovFunction]
+) -> AgentsAnswer | None:
+    """Return what an accepted certificate says of agents, with its phases; None if it says nothing."""
+    section: AgentsSection | CascadeSection | None = report.sections.get("agents")
+    if section is None:
+        return None
+    instants = rows_of(report.sections.get("instants", ()))
+    if isinstance(section, CascadeSection):
+        return replace(read_cascade(section, structure, base, functions), instants=instants)
+    phases = tuple(
+        Phase(p.function, rows_of(p.lower_triangle), p.rate, p.coupling, tuple(p.points))
+        for p in report.sections.get("phases", ())
+    )
+    return replace(read_matrix(section, structure, base, functions), phases=phases, instants=instants)
+
+
+def read_protocol(section: NominalSection | SlidingSection) -> Protocol:
+    """Return the protocol of an accepted certificate."""
+    return Protocol.from_dict({key: value for key, value in vars(section).items() if key != "disturbance"})
+
+
+def read_reaching(section: ReachingTimes | None, protocol: Protocol) -> tuple[ReachingTime, ...] | None:
+    """Return the reaching times of an accepted certificate."""
+    if section is None or protocol.reaching is None:
+        return None
+    return tuple(ReachingTime(protocol.reaching.T_r, z) for z in section.z)
