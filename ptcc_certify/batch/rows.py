@@ -204,7 +204,7 @@ def _columns(certificate: Certificate) -> Row:
         "optimality_ratio": certificate.optimality_ratio,
         "fastest": None if rate is None else certificate.fastest.kind,
         "overshoot": _up(certificate.overshoot),
-        "paper_rate": _down(certificate.proof.rate),
+        "paper_rate": _down(certificate.paper_rate),
         "diagonal_rate": _down(certificate.diagonal_rate),
         "input_bounded": None if effort is None else effort.bounded,
         "peak_input": None if effort is None or effort.peak is None else _up(Fraction(effort.peak.largest)),

@@ -41,6 +41,7 @@ from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.evidence import Observations
 from ptcc_certify.certificate.final_state_sections import stated_ends
 from ptcc_certify.certificate.graph_proof import GraphProof
+from ptcc_certify.certificate.proof import OfQuestion
 from ptcc_certify.certificate.request import Question
 from ptcc_certify.certificate.verdict import MANY_DECADES
 from ptcc_certify.errors import Change, HypothesisError, ParameterError, SimulationError
@@ -172,7 +173,7 @@ def with_word_of_check(certificate: Certificate) -> Certificate:
 
 
 @dataclass
-class GraphSteps:
+class GraphSteps(OfQuestion):
     """A graph, a protocol and what is asked, on the way to a certificate: the steps, in their order.
 
     Attributes
@@ -196,15 +197,15 @@ class GraphSteps:
 
     def certificate(self, disturbance: Any, runs: bool, reaching: tuple[ReachingTime, ...] | None) -> Certificate:
         """Return what the steps find and prove, before the independent check."""
-        if not runs and disturbance is not None and self.question.protocol.reaching is not None:
-            check_disturbance(disturbance, self.question.protocol.reaching, self.structure.graph)
-        with deadline.time_limit(SEARCHING * self.question.request.time_limit, work=self.question.request.by_work):
+        if not runs and disturbance is not None and self.protocol.reaching is not None:
+            check_disturbance(disturbance, self.protocol.reaching, self.structure.graph)
+        with deadline.time_limit(SEARCHING * self.time_limit, work=self.request.by_work):
             trajectory = self.simulation(disturbance) if runs else None
             lyapunov, rate_proof, numerical = self.paper()
             search = self.search(rate_proof)
             limit = self.upper_bound()
         matrix, result = self.final_state(trajectory)
-        ends = stated_ends(matrix, result, self.question.initial_state)
+        ends = stated_ends(matrix, result, self.initial_state)
         late, tracking = self.late_messages(ends), self.tracking(ends)
         proved = [rate_proof.rate, *(V.rate for V in search.functions)]
         proof = GraphProof(
@@ -242,13 +243,11 @@ class GraphSteps:
         graph = self.structure.graph
         self.progress(STEPS[0])
         more: dict[str, Any] = {"samples": FEW_SAMPLES} if graph.n_nodes > SIMULATED_NODES else {}
-        if self.question.sigma0 is not None:
-            more |= {"sigma0": [float(x) for x in self.question.sigma0], "disturbance": disturbance}
+        if self.sigma0 is not None:
+            more |= {"sigma0": [float(x) for x in self.sigma0], "disturbance": disturbance}
         with share_of_time(SHARES[0], STEPS[0], self.cut_off):
             try:
-                return simulate(
-                    graph, self.question.protocol, [float(x) for x in self.question.initial_state or ()], **more
-                )
+                return simulate(graph, self.protocol, [float(x) for x in self.initial_state or ()], **more)
             except SimulationError as error:
                 self.notes.append(f"simulation: {error}")
         return None
@@ -259,7 +258,7 @@ class GraphSteps:
         V, proof, numerical = None, RateProof(None, ()), None
         with share_of_time(SHARES[1], STEPS[1], self.cut_off):
             V, proof, numerical = _search_and_prove(
-                self.structure, theorem_for(self.structure, self.question.protocol.kind), self.notes
+                self.structure, theorem_for(self.structure, self.protocol.kind), self.notes
             )
         return None if V is None else replace(V, rate=proof.rate, numerical_rate=numerical), proof, numerical
 
@@ -268,13 +267,7 @@ class GraphSteps:
         self.progress(STEPS[2])
         search = Search()
         with share_of_time(SHARES[2], STEPS[2], self.cut_off):
-            search = _search_functions(
-                self.structure,
-                self.question.protocol,
-                self.question.request.method,
-                self.question.request.at,
-                self.notes,
-            )
+            search = _search_functions(self.structure, self.protocol, self.request.method, self.request.at, self.notes)
             self.cut_off += search.cut_off
         if paper.rate is None and not any(V.proved_rate > 0 for V in search.functions) and self.structure.graph.n_edges:
             self.notes.insert(0, _precision_note(self.structure.graph))
@@ -291,14 +284,14 @@ class GraphSteps:
     def final_state(self, run: Trajectory | None) -> tuple[Influence, FinalState | None]:
         """Compute who decides whom, and where the agents end: exactly, or enclosed."""
         self.progress(STEPS[4])
-        structure, x0 = self.structure, self.question.initial_state
-        sigma0 = self.question.sigma0 or (Fraction(0),) * structure.graph.n_nodes
+        structure, x0 = self.structure, self.initial_state
+        sigma0 = self.sigma0 or (Fraction(0),) * structure.graph.n_nodes
         first = None if x0 is None else [x - s if s else x for x, s in zip(x0, sigma0, strict=True)]
         matrix, result = None, None
-        by_work = self.question.request.by_work
-        seconds = (ENDING_WORK if by_work else ENDING) * self.question.request.time_limit
+        seconds = (ENDING_WORK if self.request.by_work else ENDING) * self.time_limit
         half = seconds / 2 if takes_long(structure.graph) else math.inf
-        with deadline.time_limit(half, work=by_work), share_of_time(1, f"exact {STEPS[4]}", self.cut_off):
+        limit = partial(deadline.time_limit, half, work=self.request.by_work)
+        with limit(), share_of_time(1, f"exact {STEPS[4]}", self.cut_off):
             found = influence(structure)
             if first is not None and found.exact:
                 result = final_state(structure, first, matrix=found)
@@ -306,7 +299,7 @@ class GraphSteps:
         matrix = matrix or influence_in_floats(structure)  # whatever the time
         if not matrix.exact:
             try:
-                with deadline.time_limit(half, work=by_work):
+                with limit():
                     enclosed = enclose(matrix)
                     result = None if first is None else enclosed_final_state(enclosed, first)
                 matrix = enclosed
@@ -328,10 +321,10 @@ class GraphSteps:
 
     def late_messages(self, ends: Sequence[Interval] | None) -> LateBounds | None:
         """Bound what late messages leave at the deadline; None if nothing is asked of them."""
-        messages = self.question.request.messages
+        messages = self.request.messages
         if messages is None:
             return None
-        if any(self.question.sigma0 or ()):
+        if any(self.sigma0 or ()):
             raise ParameterError(
                 (
                     "late messages ask for sigma(0) = 0, so that no sliding variable moves; leave ",
@@ -339,22 +332,15 @@ class GraphSteps:
                     " out",
                 )
             )
-        return bound_late(
-            self.structure,
-            self.question.protocol,
-            messages,
-            self.question.initial_state,
-            ends,
-            self.question.request.leaders,
-        )
+        return bound_late(self.structure, self.protocol, messages, self.initial_state, ends, self.request.leaders)
 
     def tracking(self, ends: Sequence[Interval] | None) -> Tracking | None:
         """Bound how followers track leaders that move; None if nothing is asked of that, or messages are late."""
-        leaders = self.question.request.leaders
-        if leaders is None or self.question.request.messages is not None:
+        leaders = self.request.leaders
+        if leaders is None or self.request.messages is not None:
             return None
         try:
-            return bound_tracking(self.structure, self.question.protocol, leaders, self.question.initial_state, ends)
+            return bound_tracking(self.structure, self.protocol, leaders, self.initial_state, ends)
         except LMIError as error:
             self.notes.append(f"moving leaders: {error}")
             return None

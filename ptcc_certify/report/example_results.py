@@ -51,7 +51,7 @@ def results_csv(runs: Sequence[Run]) -> str:
     """
     table = []
     for example, graph, certificate in runs:
-        claim, paper, comparison = certificate.claim, certificate.proof.rate, certificate.comparison
+        claim, paper, comparison = certificate.claim, certificate.paper_rate, certificate.comparison
         ends, (last, proved, deadline) = certificate.final_state, _reaching_times(certificate)
         final = [] if ends is None else [f"{k}={x}" for k, x in zip(ends.labels, ends.states, strict=True)]
         row = {

@@ -48,7 +48,7 @@ def test_nothing_is_admitted_and_no_axiom_is_added() -> None:
         assert not words.search(text), file.name
 
 
-@pytest.mark.parametrize(("name", "after"), [("Certificate.v", 0), ("Certificate.v", 1)])
+@pytest.mark.parametrize(("name", "after"), [("Certificate.v", 0), ("FamilyCertificate.v", 1)])
 def test_the_statement_is_one_file_of_as_many_lines_as_is_said(name: str, after: int) -> None:
     """That of a family is a second file, which asks for the first one."""
     text = re.sub(r"\(\*.*?\*\)", "", (SOURCES / name).read_text("utf-8"), flags=re.DOTALL)

@@ -58,11 +58,11 @@ def rate_facts(certificate: Certificate) -> Facts:
         text = f"overshoot constant at that rate {up(certificate.overshoot, 4)} of ||{of}||^2; functions: {kinds}"
         yield Fact(head="function", value=certificate.overshoot, side="up", note=text, detail=True)
     V, search = certificate.lyapunov, certificate.search
-    if V is not None and certificate.proof.rate is not None:
+    if V is not None and certificate.paper_rate is not None:
         rho = "" if V.rho is None else f", rho {float(V.rho):.4g}"
         overshoot = f"overshoot constant {up(V.overshoot, 4)} of ||{V.coordinates}||^2"
-        text = f"paper {down(certificate.proof.rate)} = {V.objective}{rho}; {overshoot}"
-        yield Fact(head="function", value=certificate.proof.rate, side="down", note=text, detail=True)
+        text = f"paper {down(certificate.paper_rate)} = {V.objective}{rho}; {overshoot}"
+        yield Fact(head="function", value=certificate.paper_rate, side="down", note=text, detail=True)
     if search.searched:
         searched = [f"{kind} {rate:.4g}" for kind, rate in search.searched.items()]
         limit = "" if search.diagonal_limit is None else f"; diagonal upper bound {search.diagonal_limit:.4g}"
