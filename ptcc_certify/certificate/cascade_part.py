@@ -184,7 +184,9 @@ class CascadePart(AgentsAnswer):
         """
         ones = [Roots(Fraction(1), self.protocol.gain.first)] * len(self.functions)
         roots = self.roots if any(root.state for root in self.roots) else ones
-        pairs = zip(self._values(roots, remaining), roots, strict=True)
+        q = np.atleast_1d(np.asarray(remaining, dtype=float))
+        values = self._least_values(q) if roots is self.roots else self._values(roots, q)
+        pairs = zip(values, roots, strict=True)
         return min((float(x[0]) / float_down(r.state) for x, r in pairs if r.state), default=1.0)
 
     @property
@@ -193,9 +195,9 @@ class CascadePart(AgentsAnswer):
         own = any(root.state for root in self.roots)
         return "the first ones" if own else "the larger of the first ones and of q(0)/g(0)"
 
-    def _values(self, roots: Sequence[Roots], remaining: np.ndarray | float) -> list[np.ndarray]:
-        """Return bounds of ``sqrt(V)`` of every function used."""
-        q, gain = np.atleast_1d(np.asarray(remaining, dtype=float)), self.protocol.gain
+    def _values(self, roots: Sequence[Roots], q: np.ndarray) -> list[np.ndarray]:
+        """Return bounds of ``sqrt(V)`` of every function used, from the beginning."""
+        gain = self.protocol.gain
         clock, found = gain.clock_at_remaining(q), []
         for V, root in zip(self.functions, roots, strict=True):
             own = float_up(root.state) * np.exp(-float_down(V.proved_rate) / 2 * clock)
@@ -203,9 +205,12 @@ class CascadePart(AgentsAnswer):
             if root.combined is not None:
                 own = np.minimum(own, course(gain, V.proved_rate, self.alpha, root, q).state)
             found.append(own)
-        if roots is self.roots:
-            found = [np.minimum(own, self._from_instants(k, q)[0]) for k, own in enumerate(found)]
         return found
+
+    def _least_values(self, q: np.ndarray) -> list[np.ndarray]:
+        """Return bounds of ``sqrt(V)`` of every function used, from the beginning and from instants."""
+        begun = enumerate(self._values(self.roots, q))
+        return [np.minimum(own, self._from_instants(number, q)[0]) for number, own in begun]
 
     def _from_instants(self, number: int, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return bounds of ``S`` and of ``R + g S`` of a function used, each from the last instant that tells of it."""
@@ -242,12 +247,13 @@ class CascadePart(AgentsAnswer):
         near, fast, errors, drive, integral, begin = (np.full((N, len(q)), np.inf) for _ in range(6))
         fading = np.exp(-float_down(self.alpha) * gain.clock_at_remaining(q))
         each = zip(self.functions, self.roots, self._values(self.roots, q), self.error_constants, strict=True)
-        for number, (V, root, value, constants) in enumerate(each):
+        for number, (V, root, from_start, constants) in enumerate(each):
             curve = course(gain, V.proved_rate, self.alpha, root, q)
+            state, later = self._from_instants(number, q)
+            value = np.minimum(from_start, state)
             if V.deviation is not None:
                 c = np.array([float_up(root_product(x)) for x in V.deviation.agents])
                 near = np.minimum(near, np.outer(c, value))
-                later = self._from_instants(number, q)[1]
                 fast = np.minimum(fast, np.outer(c, np.minimum(curve.combined + curve.pull * curve.state, later)))
                 drive = np.minimum(drive, np.outer(c, float_up(root.drive) * fading))
                 begin = np.minimum(begin, np.outer(c, float_up(root.velocity or Fraction(0)) * fading))
@@ -264,7 +270,7 @@ class CascadePart(AgentsAnswer):
         if not any(x for root in self.roots for x in root):
             return None
         return compare_with_bounds(
-            self.structure, self.functions, lambda q: self._values(self.roots, q), self.deviation_bound, self.input, run
+            self.structure, self.functions, self._least_values, self.deviation_bound, self.input, run
         )
 
     def __repr__(self) -> str:

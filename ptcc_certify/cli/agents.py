@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 from lmi.exact.decimal_rounding import counted
 from ptcc_certify.cli.declared import (
@@ -73,7 +73,8 @@ def _named_agents(options: Options) -> Agents | None:
     if kind is None:
         given = [name for name in _OWN if options[name] is not None]
         if given and not {"offsets", "biases"} & set(given):
-            raise ParameterError(f"{flag_of(given[0])}: is for agents of order n; give --agents double-integrator, say")
+            named = "triple-integrator" if options["a0"] is not None else "double-integrator"
+            raise ParameterError(f"{flag_of(given[0])}: is for agents of order n; give --agents {named}, say")
         if not given:
             return None
         kind = "integrator"
@@ -163,13 +164,17 @@ def agents_flags(options: Options) -> str:
     return " and ".join(flag_of(name) for name in ("agents", *_OWN) if options[name] is not None)
 
 
-def refuse_agents_of_family(options: Options, verb: str) -> NoReturn:
-    """Refuse agents of order n where a family of graphs is given, by the options that make them."""
+def refuse_agents_of_family(options: Options, verb: str) -> None:
+    """Refuse agents of order n where a family of graphs is given, by the options that make them or belong to them."""
+    virtual = verb == "certify" and options["exchange"] == "virtual"
+    if virtual or (all(options[name] is None for name in _OWN) and agents_of(options) is None):
+        return
     flags = agents_flags(options)
     verbs = ("is", "it") if " and " not in flags else ("are", "them")
-    raise ParameterError(
-        f"{flags}: {verbs[0]} not for families of graphs yet; leave {verbs[1]} out, or {verb} one graph"
-    )
+    mend = f"leave {verbs[1]} out, or {verb} one graph"
+    if verb == "certify" and options["agents"] == "double-integrator" and options["cascade"] is None:
+        mend = f"let them exchange virtual positions: --exchange virtual; or {mend}"
+    raise ParameterError(f"{flags}: {verbs[0]} not for families of graphs yet; {mend}")
 
 
 def _refuse_unproved(options: Options) -> None:

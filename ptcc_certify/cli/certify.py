@@ -12,10 +12,8 @@ from lmi.exact.decimal_rounding import down
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.agents import (
     agents_and_states,
-    agents_of,
     agents_options,
     dimension_option,
-    exchanges_virtual,
     refuse_agents_of_family,
     refuse_dimension,
 )
@@ -77,11 +75,11 @@ def certify(graph: tuple[str, ...], output: str | None, as_json: bool, screen: S
     from ptcc_certify.graphs.family import Family
 
     refuse_output(output)
-    refuse_dimension(options, "certify")
     protocol, given = shared.protocol_of(options), read_graph_or_family(graph, options)
     if isinstance(given, Family):
-        if agents_of(options) is not None and not exchanges_virtual(options):
-            refuse_agents_of_family(options, "certify")
+        refuse_agents_of_family(options, "certify")
+    refuse_dimension(options, "certify")
+    if isinstance(given, Family):
         return certify_family(graph, given, output, as_json, screen, options)
     refuse_restricted(options)
     return _certify_graph(graph[0], given, protocol, output, as_json, screen, options)

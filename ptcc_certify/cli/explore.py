@@ -57,6 +57,8 @@ def explore(graph: str, port: int, no_browser: bool, **options: Any) -> int:
         server.serve_forever()
     except KeyboardInterrupt:
         click.echo("the explorer has ended", err=True)
+        # The thread that draws may be in CasADi, which aborts where Python ends by itself around it.
+        os._exit(ExitCode.OK)
     finally:
         server.server_close()
     return ExitCode.OK

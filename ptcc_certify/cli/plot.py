@@ -197,8 +197,9 @@ def _of_family(family: Family, what: str, options: shared.Options) -> Family | C
     from ptcc_certify.certificate.procedure import certify_case
 
     refuse_options(options)
-    if what in OF_AGENTS or agents_of(options) is not None:
-        refuse_agents_of_family(options, "draw")
+    refuse_agents_of_family(options, "draw")
+    if what in OF_AGENTS:
+        raise ParameterError(f"--what {what}: is of agents of order n; ask for another figure, or draw one graph")
     given = click.get_current_context().get_parameter_source("disturbance") is ParameterSource.COMMANDLINE
     if given and options["disturbance"] is not None:
         raise ParameterError("--disturbance: runs of a family are drawn under the worst one; leave it out")

@@ -110,21 +110,20 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
     suffix, vectors = Path(output or "").suffix.lower(), options["dimension"] > 1
     if suffix not in (*FIGURES, *_TABLES):
         raise ParameterError(f"{output}: CSV is written to .csv, figures to {', '.join(FIGURES)}; choose one of these")
+    refuse_output(output)
+    protocol, signed = shared.protocol_of(options, ("delta", "disturbance")), read_graph_or_family(graph, options)
+    if isinstance(signed, Family):
+        refuse_agents_of_family(options, "simulate")
     special = agents_of(options) is not None
     if suffix in FIGURES and vectors and not special:
         raise ParameterError("a figure shows one component per agent; leave out --dimension or write CSV")
-    refuse_output(output)
-    protocol = shared.protocol_of(options, ("delta", "disturbance"))
     if vectors and options["kind"] != "nominal" and not special:
         raise ParameterError("the sliding-mode protocol is simulated for scalar agents; leave out --dimension")
-    signed = read_graph_or_family(graph, options)
     places = None if isinstance(signed, Family) else places_of(options, signed, protocol)
     special = special and places is None
     if special or isinstance(signed, Family):
         _refuse_messages(options, "families of graphs" if isinstance(signed, Family) else "agents of order n")
-    if special:
-        if isinstance(signed, Family):
-            refuse_agents_of_family(options, "simulate")
+    if special and not isinstance(signed, Family):
         motion = _run_agents(signed, protocol, options)
         _write(motion, output, "agents_motion.plot_motion", {"wide": wide, "time_unit": time_unit})
         if protocol.reaching is not None:

@@ -62,8 +62,8 @@ class CascadeProtocol(AgentsProtocol):
 
     def law(self) -> str:
         """Tell the input in one line, ``g`` standing for the gain."""
-        alpha = near(self.alpha)
-        return f"({alpha} g^2 + g') e + g e' - {alpha} g x'"
+        alpha = f"{near(self.alpha)} ".removeprefix("1 ")
+        return f"({alpha}g^2 + g') e + g e' - {alpha}g x'"
 
     def latex(self) -> str:
         r"""Return the protocol of an agent k in LaTeX, printed from its expression, with the gains as numbers.

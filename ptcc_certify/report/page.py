@@ -125,15 +125,7 @@ def rejected_html(error: RejectedCertificate, *, day: date | None = None) -> str
 
     Examples
     --------
-    >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
-    >>> with TemporaryDirectory() as folder:
-    ...     path = Path(folder, "c.json")
-    ...     certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)).save(path)
-    ...     _ = path.write_text(path.read_text().replace('"rho2": "1"', '"rho2": "2"'))
-    ...     try:
-    ...         read_certificate(path)
-    ...     except RejectedCertificate as error:
-    ...         page = rejected_html(error)
+    >>> page = rejected_html(RejectedCertificate(Path("c.json"), ptcc.check({})))
     >>> "REJECTED by the independent check" in page, "consensus" in page
     (True, False)
     """

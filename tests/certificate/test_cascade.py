@@ -430,6 +430,11 @@ def test_the_gain_of_the_protocol_does_not_depend_on_the_graph():
     assert len(laws) == 1
 
 
+def test_a_coefficient_of_one_is_not_written():
+    protocol = part_of(made(PAIR, FAST, None, Agents(order=2, cascade=1))).protocol
+    assert protocol.law() == "(g^2 + g') e + g e' - g x'" and "1 g" not in protocol.latex()
+
+
 REFUSED: list[tuple[dict[str, Any], dict[str, Any], str]] = [
     ({"order": 3}, {}, "it is proved of agents of order 2; these are of order 3"),
     ({"order": 1}, {}, "it is proved of agents of order 2; these are of order 1"),

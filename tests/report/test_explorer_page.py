@@ -265,6 +265,37 @@ def test_ctrl_c_ends_the_explorer_at_once_and_leaves_no_process():
                 os.killpg(process.pid, 0)
 
 
+BUSY = """
+import sys, casadi
+from ptcc_certify.cli import main
+from ptcc_certify.report.explorer import Explorer
+
+def preview(explorer, settings):
+    x = casadi.SX.sym("x")
+    run = casadi.integrator("run", "cvodes", {"x": x, "ode": -x}, 0, [0.1, 1])
+    print("busy", flush=True)
+    while True:
+        run(x0=1)
+
+Explorer.preview = preview
+sys.argv = ["ptcc", "explore", "--no-browser", "fig3a"]
+main()
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals are sent otherwise there")
+def test_ctrl_c_ends_the_explorer_well_while_native_code_draws():
+    """Without care two of three of these processes are aborted."""
+    for _ in range(4):
+        process = subprocess.Popen(
+            [sys.executable, "-c", BUSY], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        assert process.stdout is not None and any(line == "busy\n" for line in process.stdout)
+        process.send_signal(signal.SIGINT)
+        _, told = process.communicate(timeout=60)
+        assert process.returncode == 0 and told.endswith("the explorer has ended\n"), told
+
+
 # ---------------------------------------------------------------------- in a browser
 
 
