@@ -190,7 +190,8 @@ class LateBounds:
         return min([largest, *whole])
 
     def __repr__(self) -> str:
-        within = "nothing" if math.isinf(self.largest) else f"every agent within {up(self.largest, 2)}"
+        size = up(self.largest, 2) if self.largest else "0"
+        within = "nothing" if math.isinf(self.largest) else f"every agent within {size}"
         return f"LateBounds({self.messages!r}: {within} at T)"
 
     @property

@@ -114,11 +114,13 @@ def bound_vehicles(late: LateBounds, rows: FollowerRows) -> LateBounds:
 
     Examples
     --------
+    >>> from ptcc_certify.bounds.late_messages import bound_late
+    >>> from ptcc_certify.model.vehicles import Vehicles
     >>> structure = analyse(SignedDigraph.from_edges([(1, 2, 1)]))
     >>> messages = LateMessages(gain_cap=9, vehicles=Vehicles((Fraction(0), Fraction(1))))
     >>> ends = [(Fraction(1), Fraction(0))] * 2
     >>> bounds = bound_late(structure, NominalProtocol(rho2=4), messages, [Fraction(1), Fraction(3)], ends)
-    >>> bounds.vehicles.position.max() < 0.01, bounds.vehicles.input.max() < 800
+    >>> bounds.vehicles.position.max() < 0.01, bounds.vehicles.velocity.max() < 100
     (np.True_, np.True_)
     """
     vehicles = late.messages.vehicles

@@ -102,8 +102,9 @@ class TrackingProtocol:
         Examples
         --------
         >>> base = Gain(T=1, rho1=1, rho2=1, kappa=2)
-        >>> print(TrackingProtocol(base, Fraction(4), Fraction(3)).latex().partition("=")[2].partition(r" \\")[0][:58])
-         \left(-4 \dot{g}\right) \left(x_{k} - z_{k}\right) - 4 g
+        >>> rows = TrackingProtocol(base, Fraction(4), Fraction(3)).latex().split(r"\\")
+        >>> print(rows[1].partition(r"\left(")[0].strip())
+        \dot{z}_{k} &= g \sum_{l=1}^{N} w_{kl}
         """
         import casadi as ca
 

@@ -704,3 +704,32 @@ def test_a_rate_is_asked_of_the_loop_with_late_messages_moving_leaders_or_a_held
     ):
         run = ptcc("certify", graph, "--rho2", "3", "--min-rate", rate, "--no-simulation", *more)
         assert run.code == code, (graph, rate, more, run.out)
+
+
+VEHICLES = ("--agents", "double-integrator", "--exchange", "virtual", "--v0", "0,2,-1,3")
+
+
+def test_vehicles_that_exchange_virtual_positions_are_certified_checked_drawn_and_run():
+    late = ("--delay", "0.01", "--leader-speed", "0.5", "--gain-cap", "20")
+    said = ptcc("certify", "team.csv", *QUICK, *START, *VEHICLES, *late, "-o", "c.json")
+    assert said.code == 0
+    text = " ".join(said.out.split())
+    assert "double integrators exchange virtual positions z_k, z_k' = gain e_k, and track them: a_1 = a_2 =" in text
+    assert re.search(r"every follower within [0-9.]+ of its target at T, within [0-9.]+ from then on", text)
+    assert re.search(r"bounded up to T; \|u_k\| <= [0-9.e+]+, \|v_k\| <= [0-9.e+]+ claim", text)
+    assert "of virtual positions, without a gain cap, nothing late, leaders at rest" in text
+    assert ptcc("check", "c.json").code == 0
+    assert ptcc("plot", "c.json", "--what", "late", "-o", "late.png").code == 0
+    assert ptcc("report", "c.json", "-o", "c.html").code == 0
+    assert "It moves a virtual position" in Path("c.html").read_text()
+    run = ptcc("simulate", "team.csv", "--rho2", "4", "--kappa", "1", *START, *VEHICLES)
+    assert run.code == 0 and run.out.startswith("t,remaining,a,b,c,d,v(a)")
+    family = ptcc("certify", "team.csv", *QUICK[:4], *START, *VEHICLES, "--uncertainty", "5%", "--gain-cap", "20")
+    assert family.code == 0 and "for every signal, of virtual positions" in " ".join(family.out.split())
+
+
+@pytest.mark.parametrize("command", ["design", "plot"])
+def test_what_is_not_built_of_vehicles_is_refused(command: str):
+    more = {"design": ("--max-input", "10", "--shortest-deadline"), "plot": ("--what", "decay", "-o", "a.png")}
+    said = ptcc(command, "team.csv", *START, *VEHICLES, *more[command])
+    assert said.code == 2 and "this is not built yet" in said.err
