@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -27,11 +27,8 @@ from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.vehicles import Decay, VehiclesSection, coefficients
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.lyapunov.follower_rows import FollowerRows
 from ptcc_certify.model.gain_limits import GainLimits
-
-if TYPE_CHECKING:
-    from ptcc_certify.bounds.late_messages import LateBounds, RowBound
-    from ptcc_certify.lyapunov.follower_rows import FollowerRows
 
 #: How many times faster vehicles track than the virtual states decay.
 FASTER = 2
@@ -63,7 +60,7 @@ class VehicleBounds:
     velocity: np.ndarray | None
     input: np.ndarray | None
 
-    def over_time(self, late: LateBounds, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def over_time(self, late: Any, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return what bounds positions and velocities of all agents at instants before ``T``, ``(N, M)`` floats."""
         chosen, a1 = late.followers, float(self.a1)
         speed = np.array([float(abs(x)) for x in self.v0])[:, None]
@@ -92,7 +89,7 @@ class VehicleBounds:
             position[others] = velocity[others] = 0
         return position, velocity
 
-    def after(self, late: LateBounds) -> float | None:
+    def after(self, late: Any) -> float | None:
         """Return what bounds ``|x_k - x*_k|`` from ``T`` on under a cap; None where nothing does."""
         if late.messages.gain_cap is None:
             return None
@@ -104,8 +101,8 @@ class VehicleBounds:
         return float(min(bound.max() for bound in found))
 
 
-def bound_vehicles(late: LateBounds, rows: FollowerRows) -> LateBounds:
-    """Add what holds of vehicles that track virtual states, of which bounds by rows are proved.
+def bound_vehicles(late: Any, rows: FollowerRows) -> Any:
+    """Add what holds of vehicles that track virtual states to LateBounds, in which bounds by rows are proved.
 
     Raises
     ------
@@ -144,7 +141,7 @@ def bound_vehicles(late: LateBounds, rows: FollowerRows) -> LateBounds:
     return replace(late, vehicles=VehicleBounds(a, a, vehicles.v0, position, velocity, push))
 
 
-def _messages(late: LateBounds) -> Messages:
+def _messages(late: Any) -> Messages:
     """Return what the formulas of the check know of the messages."""
     gain, told, leaders = late.gain.gain.exact, late.messages, late.leaders
     moving = None if leaders is None else Moving(speed=leaders.speed, disturbance=leaders.disturbance)
@@ -152,7 +149,7 @@ def _messages(late: LateBounds) -> Messages:
     return Messages(exact, Numbers([Fraction(0)]), told.age, False, told.value_error, told.gain_cap, moving)
 
 
-def _decay(late: LateBounds, row: RowBound, drift: Fraction | None) -> Decay:
+def _decay(late: Any, row: Any, drift: Fraction | None) -> Decay:
     """Return the decay of a row; ``drift`` is what leaders that move add."""
     highest, messages = row.floor, _messages(late)
     if row.after is not None:
@@ -161,8 +158,8 @@ def _decay(late: LateBounds, row: RowBound, drift: Fraction | None) -> Decay:
 
 
 def _meet(
-    late: LateBounds,
-    row: RowBound,
+    late: Any,
+    row: Any,
     terms: Sequence[Fraction],
     v0: Sequence[Fraction],
     pulled: np.ndarray | float = 0.0,

@@ -24,8 +24,8 @@ from ptcc_certify.model.gain import Gain
 from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.parameters import readable
-from ptcc_certify.model.refusals import asked_of_single_integrators, refuse_agents
-from ptcc_certify.model.vehicles import Vehicles, one_cap, refuse_unproved
+from ptcc_certify.model.refusals import asked_of_single_integrators, refuse_agents, refuse_beside_virtual_positions
+from ptcc_certify.model.vehicles import Vehicles, one_cap
 
 
 class Chains(NamedTuple):
@@ -84,7 +84,7 @@ def with_vehicles(case: Case) -> Case:
     agents = case.agents
     if not (isinstance(agents, Agents) and agents.virtual):
         return case
-    refuse_unproved(case)
+    refuse_beside_virtual_positions(case)
     if case.uncertainty or is_family(case.graph):
         given: Any = as_family(case.graph, uncertainty=case.uncertainty)
         graph = given.modes[0].mandatory

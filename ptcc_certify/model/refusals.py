@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-from ptcc_certify.errors import HypothesisError, ParameterError
+from ptcc_certify.errors import Change, HypothesisError, ParameterError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.base import Protocol, refuse_no_protocol
@@ -31,6 +31,8 @@ _NOT_OF_AGENTS = {
     "disturbance": "leave it out: what holds holds for every disturbance within delta",
 }
 _NO_SET = "is not taken up here, bounds are from one initial state; leave it out, and give x0"
+#: What is not proved of double integrators that exchange virtual positions, of all that may be asked.
+_NOT_OF_VEHICLES = ("stop_before", "sample_period", "noise", "delta", "disturbance", "initial_set", "sigma0")
 #: What is not certified beside late messages, and what to do instead.
 _NOT_LATE = {
     "initial_set": _NO_SET,
@@ -107,6 +109,36 @@ def refuse_agents(case: Case) -> None:
             "derivative); otherwise their final positions depend on the disturbance: leave it out",
         )
     case.agents.refuse_motion(case.protocol.T)
+
+
+def refuse_beside_virtual_positions(case: Case) -> None:
+    """Refuse what is not proved of double integrators that exchange virtual positions.
+
+    Raises
+    ------
+    ParameterError
+        Says what.
+
+    Examples
+    --------
+    >>> from ptcc_certify.model.case import Case
+    >>> agents = Agents(order=2, exchange="virtual")
+    >>> refuse_beside_virtual_positions(Case("fig1a", NominalProtocol(), agents=agents, limits=GainLimits(stop_before="0.1")))
+    Traceback (most recent call last):
+    ptcc_certify.errors.ParameterError: stop_before is not proved yet where virtual positions are exchanged; leave it \
+or exchange out
+    """
+    given = ["protocol"] * case.sliding + [name for name in _NOT_OF_VEHICLES if case.given(name) is not None]
+    if case.leaders is not None:
+        given += ["delta"] * (case.leaders.disturbance > 0) + ["sign_gain"] * (case.leaders.sign_gain is not None)
+    if case.messages is not None and case.messages.own_delay:
+        given.append("own_delay")
+    if case.signal != "any":
+        given.append("signal")
+    if given:
+        what = {"protocol": "the sliding-mode protocol ", "signal": "a restricted signal "}.get(given[0], "")
+        why = f"{what}is not proved yet where virtual positions are exchanged; leave it or "
+        raise ParameterError(given[0], (why, Change("exchange"), " out"))
 
 
 def asked_of_single_integrators(case: Case) -> list[str]:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-from ptcc_certify.errors import Change, ParameterError
+from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.model.base import aligned, symbols
 from ptcc_certify.model.casadi_latex import to_latex
@@ -24,11 +24,6 @@ from ptcc_certify.model.nominal import coupling
 
 if TYPE_CHECKING:
     import casadi as ca
-
-    from ptcc_certify.model.case import Case
-
-#: What is not proved of vehicles, of all that may be asked.
-_NOT_PROVED = ("stop_before", "sample_period", "noise", "delta", "disturbance", "initial_set", "sigma0")
 
 
 @dataclass(frozen=True)
@@ -123,36 +118,6 @@ class TrackingProtocol:
 
     def _repr_latex_(self) -> str:
         return f"$${self.latex()}$$"
-
-
-def refuse_unproved(case: Case) -> None:
-    """Refuse what is not proved of double integrators that exchange virtual positions.
-
-    Raises
-    ------
-    ParameterError
-        Says what.
-
-    Examples
-    --------
-    >>> from ptcc_certify.model.case import Case
-    >>> agents = Agents(order=2, exchange="virtual")
-    >>> refuse_unproved(Case("fig1a", NominalProtocol(), agents=agents, limits=GainLimits(stop_before="0.1")))
-    Traceback (most recent call last):
-    ptcc_certify.errors.ParameterError: stop_before is not proved yet where virtual positions are exchanged; leave it \
-or exchange out
-    """
-    given = ["protocol"] * case.sliding + [name for name in _NOT_PROVED if case.given(name) is not None]
-    if case.leaders is not None:
-        given += ["delta"] * (case.leaders.disturbance > 0) + ["sign_gain"] * (case.leaders.sign_gain is not None)
-    if case.messages is not None and case.messages.own_delay:
-        given.append("own_delay")
-    if case.signal != "any":
-        given.append("signal")
-    if given:
-        what = {"protocol": "the sliding-mode protocol ", "signal": "a restricted signal "}.get(given[0], "")
-        why = f"{what}is not proved yet where virtual positions are exchanged; leave it or "
-        raise ParameterError(given[0], (why, Change("exchange"), " out"))
 
 
 def one_cap(caps: Sequence[Fraction | None]) -> Fraction | None:
