@@ -122,8 +122,8 @@ def refuse_beside_virtual_positions(case: Case) -> None:
     Examples
     --------
     >>> from ptcc_certify.model.case import Case
-    >>> agents = Agents(order=2, exchange="virtual")
-    >>> refuse_beside_virtual_positions(Case("fig1a", NominalProtocol(), agents=agents, limits=GainLimits(stop_before="0.1")))
+    >>> agents, limits = Agents(order=2, exchange="virtual"), GainLimits(stop_before="0.1")
+    >>> refuse_beside_virtual_positions(Case("fig1a", NominalProtocol(), agents=agents, limits=limits))
     Traceback (most recent call last):
     ptcc_certify.errors.ParameterError: stop_before is not proved yet where virtual positions are exchanged; leave it \
 or exchange out
