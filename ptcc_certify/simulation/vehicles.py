@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 
 #: Instants of a run that vehicles follow.
 _SAMPLES = 1001
+#: The least ``1 - t/T`` at which the input is told without a cap: nearer by rounding takes it over.
+_NEAREST = 1e-5
 
 
 class _Tracking(Motion):
@@ -184,7 +186,8 @@ def follow(run: Trajectory, protocol: TrackingProtocol, v0: Sequence[Fraction]) 
             x[:, i + 1] = z[:, i + 1] + lag + kept * (ahead[:, i] + ahead[:, i + 1]) / (2 * a1)
         v = r - a1 * g * (x - z)
         u = -a1 * _slope(protocol, g) * (x - z) - a1 * g * (v - run.input) - a2 * g * r
-    u = np.where(np.isfinite(u), u, np.nan)
+    seen = np.isfinite(u) & ((run.remaining > _NEAREST) | (protocol.gain_cap is not None))
+    u = np.where(seen, u, np.nan)
     if run.targets is not None:  # leaders that move as they like send their own positions
         leading = run.graph.in_weight() == 0
         x[leading], u[leading] = z[leading], 0.0

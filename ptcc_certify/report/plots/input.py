@@ -156,7 +156,8 @@ def _every_period_sampled(run: Trajectory) -> bool:
 
 def _peaks(run: Trajectory, certificate: Certificate) -> list[Peak]:
     """Return what bounds the input of a run, and with late messages."""
-    peak, late = _certified_peak(run, certificate), certificate.late
+    late = certificate.late
+    peak = None if run.vehicles else _certified_peak(run, certificate)  # which is of the virtual positions then
     found = [] if peak is None else [Peak(peak, f"certified peak {up(peak, 4)}{_set_text(run, certificate)}")]
     if late is not None and (largest := largest_late_input(late, certificate.protocol)) is not None:
         whole = ", from within 1 of the final states" if late.relative else ""

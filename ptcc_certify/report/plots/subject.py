@@ -173,7 +173,6 @@ def limits_text(run: Trajectory, certificate: Certificate | None) -> str:
         numbers = dict(zip(_LIMITS, (limits.gain_cap, limits.stop_before, limits.sample_period), strict=True))
     numbers |= {} if messages is None else {"messages late by up to": messages.age, "off by": messages.value_error}
     named = [f"{name} {near(number)}" for name, number in numbers.items() if number]
-    named += ["vehicles that track virtual positions"] if run.vehicles else []
     named += [] if leaders is None else [f"leaders move at up to {near(leaders.speed)}"]
     if certificate is not None:
         vehicles = run.vehicles
@@ -186,7 +185,7 @@ def limits_text(run: Trajectory, certificate: Certificate | None) -> str:
             "without noise": forced and certificate.noise,
         }
         named += [text for text, there in absent.items() if there]
-    return ", ".join(named)
+    return ", ".join(named or ["vehicles that track virtual positions"] * run.vehicles)
 
 
 def require_same(run: Trajectory, certificate: Certificate) -> None:
