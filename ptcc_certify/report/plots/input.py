@@ -223,7 +223,7 @@ def plot_effort(
     run = trajectory_of(subject)
     certificate = subject if isinstance(subject, Certificate) else certificate
     effort, bound = None if certificate is None else _certified_effort(run, certificate), None
-    if effort and effort.energy and not (effort.initial_set or run.conditions.actuator or run.sliding):
+    if effort and effort.energy and not (effort.initial_set or run.conditions.actuator or run.sliding or run.vehicles):
         bound = float(effort.energy.value)
     ax, energy = axes_of(ax), _energy(run)
     ax.plot(run.t, energy, color=RUN, label="simulated (CVODES)")
