@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from selection import thinned
@@ -13,6 +15,7 @@ import ptcc_certify as ptcc
 from lmi.exact.decimal_rounding import down, up
 from ptcc_certify.cli.terminal import flagged
 from ptcc_certify.errors import Change, ParameterError, spell
+from ptcc_certify.report.facts.late import _within_text
 from ptcc_certify.report.page import set_note
 from ptcc_certify.report.screen import certificate_lines, summary_lines
 
@@ -79,3 +82,10 @@ def test_labels_that_look_like_signs_stand_as_they_are():
     certificate = ptcc.certify([("<b>", "a", -1), ("a", "<b>", -1)], WEAK, [0, 5], asks=ptcc.Asks(simulation=False))
     (end,) = (fact for fact in certificate.facts() if fact.head == "x(T)")
     assert "<bdi>&lt;b&gt;</bdi>=" in set_note(end.note)
+
+
+def test_what_holds_from_the_deadline_on_holds_at_it():
+    late: Any = SimpleNamespace(leaders=object(), relative=False, settling=None)
+    for largest, after, at in ((0.025, 0.0195, "0.02"), (0.0095, 0.0195, "0.0095")):
+        late.largest, late.after = largest, after
+        assert _within_text(late, 2) == f"every follower within {at} of its target at T, within 0.02 from then on"
