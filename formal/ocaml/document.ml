@@ -88,7 +88,7 @@ let hashed (v : Json.t) : string =
         go (i + more + 1) end end in
     go 0; Buffer.add_char b '"' in
   let rec put depth v =
-    need (depth <= 8) "nested too deep";
+    need (depth <= 12) "nested too deep";
     if Buffer.length b > 60000 then feed ();
     match v with
     | Null -> Buffer.add_string b "null" | Bool x -> Buffer.add_string b (string_of_bool x)

@@ -122,6 +122,7 @@ def test_the_schema_is_a_strict_schema():
         "ReadSection": {"zeros", "laplacian", "columns", "variable"},
         "BlockSection": {"diagonal", "lower_triangle"},
         "RowsBound": {"drift", "after"},
+        "MessagesSection": {"vehicles"},
         "FamilyFunctionsSection": {"drives"},
         "FamilyInput": {"sliding"},
         "SharesSection": {"final_state"},
