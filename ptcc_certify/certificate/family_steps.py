@@ -43,7 +43,7 @@ from ptcc_certify.lyapunov.aimed_forms import Aim, aimed_functions
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.family_rate_upper_bound import prove_family_rate_bound
 from ptcc_certify.lyapunov.family_search import CLOSED_ROWS, FULL_ROWS, FamilySearch, search_family
-from ptcc_certify.lyapunov.follower_function import LOSSES, FollowerFunction, follower_functions
+from ptcc_certify.lyapunov.follower_function import follower_functions
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.squares_function import SquaresFunction, squares_function
 from ptcc_certify.model import Protocol
@@ -236,12 +236,6 @@ def _dense(component: FamilyComponent, notes: list[str]) -> tuple[ProvedFunction
     return search.functions
 
 
-def _led(component: FamilyComponent) -> list[FollowerFunction]:
-    """Return a function of rows if small parts lead in which something moves, for the rates of these parts."""
-    found = follower_functions(component, LOSSES[:1], largest_part=component.nodes.size // 2)
-    return [W for W in found if W.parts]
-
-
 def _aim(quotient: Quotient, protocol: Protocol, x: Sequence[Fraction]) -> Aim | None:
     """Return where bounds should be small: at the instants that are reported; None where other functions serve."""
     begin = quotient.coordinates(x)
@@ -285,7 +279,6 @@ def _prove(
         search = search_family(quotient, enough=enough, slower=aim is None)
         for V in () if aim is None else aimed_functions(quotient, aim, search.functions, notes):
             aimed.append(V)  # kept, whatever comes after
-        aimed += [] if aim is None else _led(component)
     notes += [*search.notes, *(f"{name}: cut off by the time limit" for name in search.cut_off)]
     rate = max((V.rate for V in search.functions), default=Fraction(0))
     if bound is not None and search.functions and rate < _ENOUGH * bound.value:

@@ -194,15 +194,12 @@ class FollowerFunction:
 
 
 def follower_functions(
-    component: FamilyComponent,
-    losses: Sequence[float] = LOSSES,
-    notes: list[str] | None = None,
-    largest_part: int = LARGEST_PART,
+    component: FamilyComponent, losses: Sequence[float] = LOSSES, notes: list[str] | None = None
 ) -> Iterator[FollowerFunction]:
     """Search and prove functions of a component that has followers and common states at rest; from the fastest.
 
-    Yields nothing where rows prove no positive rate, or no function is found of a part that the followers hear, as of
-    those of more agents than ``largest_part``; ``notes`` is told which.
+    Yields nothing where rows prove no positive rate, or no function is found of a part that the followers hear;
+    ``notes`` is told which.
 
     Examples
     --------
@@ -215,7 +212,7 @@ def follower_functions(
     followers = follower_nodes(family)
     if component.kernel is None or not followers.size:
         return
-    parts = _leading_parts(family, followers, largest_part)
+    parts = _leading_parts(family, followers)
     if parts is None:
         if notes is not None:
             notes.append("no function was found of the agents that lead")
@@ -229,16 +226,17 @@ def follower_functions(
         notes.append("the rows of the followers prove no rate")
 
 
-def _leading_parts(family: Family, followers: np.ndarray, largest_part: int) -> list[LeadingPart] | None:
+def _leading_parts(family: Family, followers: np.ndarray) -> list[LeadingPart] | None:
     """Return the parts of ``R`` in which something moves, each with its function; None if one has none."""
     rest = np.setdiff1d(np.arange(family.n_nodes), followers)
     part_family = family.restricted(rest)
     source, target, _ = part_family.union
     parts = []
-    moving = [own for own in weak_components(rest.size, source, target) if own.size > 1]
-    if any(own.size > largest_part for own in moving):
-        return None
-    for own in moving:
+    for own in weak_components(rest.size, source, target):
+        if own.size == 1:
+            continue
+        if own.size > LARGEST_PART:
+            return None
         (component,) = decide(part_family.restricted(own))
         try:
             quotient = Quotient.of(component)

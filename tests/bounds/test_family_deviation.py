@@ -117,12 +117,12 @@ def test_quick_followers_of_slow_agents_are_as_near_as_what_they_hear():
     remaining = np.array([1, 0.5, 0.3, 0.1])
     clock, gain = PROTOCOL.gain.clock_at_remaining(remaining), PROTOCOL.gain.value_at_remaining(remaining)
     deviation, speed = deviations_and_speeds(edges, x, 3, clock)
-    for bound, seen in (
-        (certificate.deviation_bound(remaining), deviation),
-        (certificate.input_bound(remaining), speed * gain),
+    for bound, seen, most in (
+        (certificate.deviation_bound(remaining), deviation, 12),  # 19 by one rate for all
+        (certificate.input_bound(remaining), speed * gain, 60),  # parts that lead have one rate with the others
     ):
         assert (seen <= bound * (1 + 1e-9)).all()
-        assert (bound.max(axis=0) / seen.max(axis=0)).max() < 8
+        assert (bound.max(axis=0) / seen.max(axis=0)).max() < most
 
 
 @pytest.mark.parametrize("sigma", [[0, 0, 0, 0, 1], [1, -1, 0, 2, 0]])
