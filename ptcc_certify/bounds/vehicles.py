@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from lmi.exact.decimal_rounding import up
+from lmi.exact.decimal_rounding import float_up, up
 from ptcc_certify.bounds.section_numbers import floats_up
 from ptcc_certify.bounds.tracking import drift_integral
 from ptcc_certify.checker.input_formulas import PrescribedGain
@@ -68,7 +68,7 @@ class VehicleBounds:
         position, velocity = (np.full((speed.size, len(t)), np.inf) for _ in range(2))
         for row in late.rows:
             b = float(row.witness.b)
-            if b >= a1:
+            if row.witness.b >= self.a1 or row.witness.b > self.a2:
                 continue
             caps = [x for x in (row.cap, late.messages.gain_cap) if x is not None]
             y = np.exp(-b * GainLimits(gain_cap=min(caps, default=None)).limit(late.gain.gain).clock(t))
@@ -90,15 +90,27 @@ class VehicleBounds:
         return position, velocity
 
     def after(self, late: Any) -> float | None:
-        """Return what bounds ``|x_k - x*_k|`` from ``T`` on under a cap; None where nothing does."""
-        if late.messages.gain_cap is None:
+        """Return what bounds ``|x_k - x*_k|`` from ``T`` on under a cap; None where nothing does.
+
+        With ``C <= after`` at all times ``|x_k - x*_k|`` is at most ``u_k (a_1 M y/(a_1 - b) + floor + after)``, what
+        the initial velocity adds, and ``speed/(a_1 g)``, what a vehicle lags behind a target that moves: with ``g =
+        g(0)``, or from ``T`` on with the cap if it is less than that at ``T``.
+        """
+        cap, speed = late.messages.gain_cap, late.leaders.speed
+        if cap is None:
             return None
-        found = [
-            _meet(late, row, coefficients(_messages(late), _decay(late, row, row.after), self.a1, self.a2)[0], self.v0)
-            for row in late.rows
-            if row.witness.b < self.a1
-        ]
-        return float(min(bound.max() for bound in found))
+        messages, at_T = _messages(late), self.position
+        early, lasting = (float_up(speed / (self.a1 * g)) for g in (messages.least_gain(), cap))
+        found = []
+        for row in late.rows:
+            if row.witness.b >= self.a1 or row.witness.b > self.a2:
+                continue
+            terms = coefficients(
+                messages, _decay(late, replace(row, floor=row.floor + row.after), None), self.a1, self.a2
+            )
+            bound = _meet(late, row, terms[0], self.v0)
+            found += [(bound + early).max(), np.maximum(bound + lasting, at_T).max()]
+        return float(min(found)) * _MORE
 
 
 def bound_vehicles(late: Any, rows: FollowerRows) -> Any:

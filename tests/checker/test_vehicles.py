@@ -226,6 +226,16 @@ def test_cvodes_the_filters_and_the_expression_agree(cap: int | None):
     assert [np.interp(0.5, run.t, row) for row in run.positions[:, 0]] == pytest.approx(end, abs=1e-3)
 
 
+def test_vehicles_lag_behind_leaders_that_move_from_the_deadline_on_too():
+    """At a constant gain of 1 a ramp leaves ``2 age + 1`` of virtual positions, and ``1/a_1`` more of vehicles."""
+    graph = SignedDigraph.from_edges([("L", "a", 1), ("L", "b", 1), ("a", "b", 1), ("b", "a", 1)])
+    parts = {"messages": LateMessages(delay=1, gain_cap=1), "leaders": MovingLeaders(speed=1)}
+    late = certify(graph, NominalProtocol(T=20), InitialState([0, 1, -1]), agents=VIRTUAL, **parts).late
+    lag = 3 + 1 / float(late.vehicles.a1)
+    assert lag <= late.after <= lag + 0.01
+    assert late.vehicles.position.max() >= lag - 0.01
+
+
 def test_vehicles_that_begin_on_their_targets_with_a_velocity_are_bounded():
     graph, initial = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 2)]), InitialState([1, 1, 1], v0=[0, 3, 0])
     limits = GainLimits(gain_cap=20)
