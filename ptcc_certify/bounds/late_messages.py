@@ -232,8 +232,10 @@ class LateBounds:
         return self.staged is not None and len(set(self.staged)) == 1
 
     def deviation_bound(self, t: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Return what bounds ``|x_k - x_k*|`` at instants, ``(F, M)`` floats; infinite where nothing does."""
+        """Return what bounds ``|x_k - x_k*|`` at instants, of vehicles theirs, ``(F, M)`` floats; or infinite."""
         t = np.asarray(t, dtype=float)
+        if self.vehicles is not None:
+            return self.vehicles.over_time(self, t)[0][self.followers]
         whole = np.full((self.followers.size, len(t)), np.inf)
         for row in self.rows:
             cap = [x for x in (row.cap, self.gain.limits.gain_cap) if x is not None]
@@ -253,6 +255,8 @@ class LateBounds:
 
     def largest_bound(self, t: Sequence[float] | np.ndarray) -> np.ndarray:
         """Return what bounds the largest ``|x_k - x_k*|`` of all agents at instants, ``(M,)`` floats."""
+        if self.vehicles is not None:  # leaders that have a velocity move, too
+            return np.asarray(self.vehicles.over_time(self, np.asarray(t, dtype=float))[0].max(axis=0))
         bounds = [one.deviation_bound(self.gain, np.asarray(t, dtype=float)) for one in self._of_all]
         if not bounds:
             return np.asarray(self.deviation_bound(t).max(axis=0))

@@ -61,10 +61,12 @@ class VehicleBounds:
     input: np.ndarray | None
 
     def over_time(self, late: Any, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return what bounds positions and velocities of all agents at instants before ``T``, ``(N, M)`` floats."""
+        """Return what bounds positions and velocities of all agents at instants up to ``T``, ``(N, M)`` floats."""
         chosen, a1 = late.followers, float(self.a1)
         speed = np.array([float(abs(x)) for x in self.v0])[:, None]
-        g, first = late.gain.value(t), float(_messages(late).least_gain())
+        with np.errstate(divide="ignore"):  # without a cap the gain is infinite at T
+            g = late.gain.value(t)
+        first = float(_messages(late).least_gain())
         position, velocity = (np.full((speed.size, len(t)), np.inf) for _ in range(2))
         for row in late.rows:
             b = float(row.witness.b)

@@ -236,6 +236,22 @@ def test_vehicles_lag_behind_leaders_that_move_from_the_deadline_on_too():
     assert late.vehicles.position.max() >= lag - 0.01
 
 
+@pytest.mark.parametrize("cap", [None, 30])
+def test_the_bound_that_is_drawn_is_above_the_vehicles(cap: int | None):
+    graph = SignedDigraph.from_edges([("l", "a", 1), ("a", "b", -2), ("b", "a", "-0.5"), ("l", "b", -1)])
+    initial, messages = InitialState([1, 2, -3], v0=[0, 1, -1]), LateMessages(delay="0.03", gain_cap=cap)
+    made = certify(graph, NominalProtocol(T=1, rho2=1, kappa=4), initial, agents=VIRTUAL, messages=messages)
+    run = made.asked_trajectory
+    assert run is not None
+    away = np.abs(run.states - np.asarray(made.final_state, dtype=float)[:, None])
+    inside = run.t <= 1
+    bound = made.late.largest_bound(run.t[inside])
+    assert (away[:, inside].max(axis=0) <= bound * (1 + 1e-6) + 1e-9).all() and bound[0] < 10
+    assert (made.late.deviation_bound(run.t[inside]).max(axis=0) <= bound).all()
+    lines = {line.get_label(): line.get_ydata() for line in made.plot().lines}
+    assert (lines["vehicles"] <= lines["proved bound"] * (1 + 1e-6) + 1e-9).all()
+
+
 def test_vehicles_that_begin_on_their_targets_with_a_velocity_are_bounded():
     graph, initial = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 2)]), InitialState([1, 1, 1], v0=[0, 3, 0])
     limits = GainLimits(gain_cap=20)
