@@ -83,9 +83,10 @@ class VehicleBounds:
             decaying = float(row.initial) * y + C
             own = u * (a1 * lag * decaying + floor) + speed * lag / first * y
             ahead = u * (decaying + floor) + speed / (a1 * first) * y
-            position = np.minimum(position, own * _MORE + _LEAST)
+            least = np.where(decaying + floor > 0, _LEAST, 0.0)
+            position = np.minimum(position, own * _MORE + least)
             with np.errstate(invalid="ignore"):
-                velocity = np.minimum(velocity, a1 * g * (own + ahead) * _MORE + _LEAST)
+                velocity = np.minimum(velocity, a1 * g * (own + ahead) * _MORE + least)
         if late.leaders is not None:  # which move as they like
             others = np.setdiff1d(np.arange(speed.size), chosen)
             position[others] = velocity[others] = 0
