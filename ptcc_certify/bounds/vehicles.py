@@ -181,7 +181,7 @@ def _meet(
     degrees: np.ndarray | float = 0.0,
 ) -> np.ndarray:
     """Return the bounds of all agents by the coefficients of one decay, in floats from above."""
-    by_velocity, by_u, by_pull, by_degree, by_error = (float(x) for x in terms)
+    by_velocity, by_u, by_pull, by_degree, by_error = (float_up(x) for x in terms)
     bound = by_velocity * np.array([float(abs(x)) for x in v0]) * _MORE
     u = row.witness.u
     bound[late.followers] += u * by_u + (pulled * by_pull + degrees * u * by_degree + degrees * by_error) * _MORE
