@@ -43,8 +43,11 @@ _MOST_ORDER = 8
 #: Options that need ``--agents``.
 _OWN = (*names_of(Agents)[1:], "v0", "a0")
 
+#: Where double integrators may do so, and what is proved of those that do.
+_EXCHANGE = "let them exchange virtual positions: --exchange virtual; or"
+_OF_VEHICLES = {*names_of(LateMessages), *names_of(MovingLeaders)} - {"own_delay", "sign_gain"}
 #: What is said where late messages are asked of agents of order n; then what makes them such is named.
-_MESSAGES = "late messages are proved of single integrators alone: leave it out, or leave out"
+_MESSAGES = "late messages are proved of single integrators and of virtual positions: leave it out, or leave out"
 #: Options that are of single integrators alone, and what to do instead.
 _OF_SINGLE_INTEGRATORS = {
     "stop_before": "leave it out, or cap the gain with --gain-cap",
@@ -107,7 +110,7 @@ def agents_and_states(
         return None, None
     d = options["dimension"] or 1
     if not (certified and d == 1 and (agents.of_paper or agents.virtual)):
-        _refuse_unproved(options)
+        _refuse_unproved(options, certified and d == 1)
     agents = _in_places(agents, options, graph, d)
     given = [options["v0"], options["a0"]]
     later = [
@@ -172,12 +175,19 @@ def refuse_agents_of_family(options: Options, verb: str) -> None:
     flags = agents_flags(options)
     verbs = ("is", "it") if " and " not in flags else ("are", "them")
     mend = f"leave {verbs[1]} out, or {verb} one graph"
-    if verb == "certify" and options["agents"] == "double-integrator" and options["cascade"] is None:
-        mend = f"let them exchange virtual positions: --exchange virtual; or {mend}"
+    if verb == "certify" and _may_exchange(options):
+        mend = f"{_EXCHANGE} {mend}"
     raise ParameterError(f"{flags}: {verbs[0]} not for families of graphs yet; {mend}")
 
 
-def _refuse_unproved(options: Options) -> None:
+def _may_exchange(options: Options) -> bool:
+    """Tell whether agents are double integrators that could exchange virtual positions, of which more is proved."""
+    plain = all(options[name] is None for name in _OWN if name != "v0")
+    plain = plain and not options.get("own_delay") and options.get("kind") == "nominal"
+    return options["agents"] == "double-integrator" and plain
+
+
+def _refuse_unproved(options: Options, certified: bool) -> None:
     """Refuse what is asked of single integrators alone, by the names of the options: those with one mend at once."""
     if exchanges_virtual(options):
         raise ParameterError(
@@ -189,6 +199,8 @@ def _refuse_unproved(options: Options) -> None:
         mend = _OF_SINGLE_INTEGRATORS[given[0]]
         flags = [flag_of(name) for name in given if _OF_SINGLE_INTEGRATORS[name] == mend]
         mend += f" {agents_flags(options)}" if mend == _MESSAGES else ""
+        if certified and set(given) <= _OF_VEHICLES and _may_exchange(options):
+            mend = f"{_EXCHANGE} leave it out"
         verb, mend = ("is", mend) if len(flags) == 1 else ("are", mend.replace("leave it", "leave them"))
         whom = "in a formation" if options["agents"] is None else "of order n"
         raise ParameterError(f"{' and '.join(flags)}: {verb} not proved of agents {whom}; {mend}")

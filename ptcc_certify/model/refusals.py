@@ -26,8 +26,10 @@ _NOT_OF_AGENTS = {
     "limits": "give Agents(gain_cap=..) instead of a gain cap; a stop and sampling are not proved for them",
     "delta": "take the sliding-mode protocol, which disturbances within delta do not move",
     "noise": "leave it out",
-    "messages": "leave it out, or leave out agents; with late messages nothing is proved of them",
-    "leaders": "leave it out; their leaders move as their plant does",
+    "messages": "leave it out, or let double integrators exchange virtual positions, which may come late: "
+    "Agents(order=2, exchange='virtual')",
+    "leaders": "leave it out; their leaders move as their plant does, unless double integrators exchange virtual "
+    "positions: Agents(order=2, exchange='virtual')",
     "disturbance": "leave it out: what holds holds for every disturbance within delta",
 }
 _NO_SET = "is not taken up here, bounds are from one initial state; leave it out, and give x0"

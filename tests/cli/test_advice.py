@@ -50,7 +50,7 @@ VALUES = {
     },
 }
 FLAGS = ("--switching", "--undirected", "--drop-self-loops", "--shortest-deadline", "--own-delay", "--restart")
-_VALUE = r"-?\d[\w./%+-]*|best|lmi|sliding-mode|nominal|double-integrator|states|motion"
+_VALUE = r"-?\d[\w./%+-]*|best|lmi|sliding-mode|nominal|double-integrator|states|motion|virtual"
 _OPTION = re.compile(r"--[A-Za-z][\w-]*")
 
 
@@ -122,6 +122,13 @@ COMMANDS = [
     "certify chain.csv --offsets 1,2,3 --quantisation 0.1",
     "certify chain.csv --offsets 1,2,3 --leader-speed 1",
     "certify chain.csv --offsets 1,2,3 --sign-gain 1",
+    "certify chain.csv --agents double-integrator --delay 0.01",
+    "certify chain.csv --agents double-integrator --quantisation 0.1 --v0 0,1,0",
+    "certify chain.csv --agents double-integrator --leader-speed 1",
+    "certify chain.csv --agents double-integrator --leader-speed 1 --sign-gain 2",
+    "certify chain.csv --agents double-integrator --delay 0.01 --own-delay --gain-cap 3",
+    "certify chain.csv --agents double-integrator --rest 1 --uncertainty 5%",
+    "certify chain.csv --agents double-integrator --protocol sliding-mode --uncertainty 5%",
     "certify chain.csv --offsets 1,2,3 --at 0.5",
     "certify chain.csv --offsets 1,2,3 --noise 0.1",
     "certify chain.csv --offsets 1,2,3 --stop-before 0.1",

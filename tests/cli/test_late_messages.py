@@ -253,11 +253,11 @@ def test_followers_track_leaders_that_move_and_the_file_says_so() -> None:
         (("team.csv", "--leader-speed", "1", "--delay", "1", "--noise", "1", "--gain-cap", "9"), "of 4 NU"),
         (
             ("team.csv", "--delay", "1", "--agents", "double-integrator"),
-            "--delay: is not proved of agents of order n; late messages are proved of",
+            "--delay: is not proved of agents of order n; let them exchange virtual positions: --exchange virtual; or",
         ),
         (
             ("team.csv", "--leader-speed", "1", "--agents", "double-integrator"),
-            "--leader-speed: is not proved of agents of order n; leave it out",
+            "--leader-speed: is not proved of agents of order n; let them exchange virtual positions: --exchange",
         ),
     ],
 )
