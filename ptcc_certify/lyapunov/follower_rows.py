@@ -318,14 +318,14 @@ def refuse_other_targets(family: Family) -> None:
         labels, kernel = component.family.labels, component.kernel
         if kernel is None or component.behaviour is None:
             raise HypothesisError(
-                "late messages and moving leaders: where agents are drawn to depends on the signal here, "
-                "of which nothing is proved yet"
+                "late messages, moving leaders and virtual positions: where agents are drawn to depends on the signal "
+                "here, of which nothing is proved yet"
             )
         heard = set(listeners(component.family).tolist())
         group = next((c for c in kernel.structure.closed_components if heard.intersection(c.nodes)), None)
         if group is not None:
             raise HypothesisError(
-                f"late messages and moving leaders of a family: leaders hear nobody in any mode; "
+                "late messages, moving leaders and virtual positions of a family: leaders hear nobody in any mode; "
                 f"{shorten(labels[group.nodes[0]])} leads and hears others, of which nothing is proved yet"
             )
 
