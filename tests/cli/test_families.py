@@ -344,6 +344,20 @@ def test_a_family_is_certified_for_every_disturbance(tmp_path: Path, monkeypatch
     assert "sigma(0) 0" in direct.out and "at 0.99 T" in direct.out and direct.code == 0
 
 
+def test_rows_with_intervals_that_are_always_zero_and_self_loops_are_dropped_where_asked(folder):
+    Path("i.csv").write_text(_rows("a,b,1,2", "b,c,0,0.0", "c,c,1,2", "c,a,-2,-1"))
+    dropped = ("--drop-zeros", "--drop-self-loops")
+    assert (
+        "--drop-zeros" in ptcc("certify", "i.csv").err
+        and "--drop-self-loops" in ptcc("certify", "i.csv", dropped[0]).err
+    )
+    run = ptcc("certify", "i.csv", *dropped, "-o", "i.json", "-v")
+    assert run.code == 0 and "i.csv: 1 self-loop and 1 row of weight 0 dropped" in " ".join(run.out.split())
+    assert ptcc("check", "i.json", "i.csv", *dropped).code == 0
+    Path("same.csv").write_text(_rows("a,b,1,2", "c,a,-2,-1"))
+    assert ptcc("check", "i.json", "same.csv").code == 0
+
+
 BAD = {
     "least above largest": (_rows("a,b,2,1"), (), "bad.csv, line 2: edge a -> b: the least weight 2 is above"),
     "always zero": (_rows("a,b,0,0"), (), "line 2: edge a -> b: its weight is always 0"),
@@ -366,7 +380,7 @@ BAD = {
     "loop": (_rows("a,a,1,2"), (), "self-loop at node a"),
     "no source": (_rows(",b,1,2"), (), "the source is empty"),
     "no rows": (_rows(), (), "bad.csv: no edge and no node"),
-    "sum of intervals": (_rows("a,b,1,2"), ("--duplicates", "sum"), "neither merged nor dropped"),
+    "sum of intervals": (_rows("a,b,1,2"), ("--duplicates", "sum"), "rows with intervals are not merged"),
     "interval and share": (_rows("a,b,1,2"), ("--uncertainty", "1%"), "gives intervals itself"),
     "other nodes": ("a,b,1", ("day.csv", "--switching"), "mode bad has no node c, which another mode has"),
     "not switching": ("a,b,1", ("day.csv",), "2 graphs; add --switching"),

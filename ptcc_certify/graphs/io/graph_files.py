@@ -5,13 +5,13 @@ from __future__ import annotations
 import gzip
 import os
 import re
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-from lmi.exact.decimal_rounding import near
+from lmi.exact.decimal_rounding import counted, near
 from ptcc_certify.errors import FormatError, GraphError, ParameterError
 from ptcc_certify.graphs.digraph import WAY, SignedDigraph, graph_of
 from ptcc_certify.graphs.family import Family, Mode, read_share
@@ -393,15 +393,18 @@ def read_family(
     ways, notes = dict[str, str](), list[str]()
     missing = set(wanted)
     for number, path in enumerate(sources, 1):
-        rows = _interval_rows(path, orientation or "information", share, undirected)
+        dropped = [option for option in _DROPS if options.get(option)]
+        rows = _interval_rows(path, orientation or "information", share, undirected, dropped)
         name = stem = _mode_name(path, number)
         again = number
         while name in named:  # no mode may take the place of another
             name, again = f"{stem} ({again})", again + 1
         if rows is not None:
-            if any(value != getattr(Reading, option) for option, value in options.items()):
-                raise ParameterError("rows with intervals are neither merged nor dropped; mend them in the file")
-            nodes, edges = rows
+            others = {option: value for option, value in options.items() if option not in _DROPS}
+            if any(value != getattr(Reading, option) for option, value in others.items()):
+                raise ParameterError("rows with intervals are not merged; mend them in the file")
+            nodes, edges, note = rows
+            notes += [note] if note else []
             both = [{*_both(edge[:2], undirected)} for edge in edges]
             off = set(wanted) & set[tuple[str, str]]().union(*both)
             edges = [(*e[:2], *may_fail(*e[2:])) if off & pairs else e for e, pairs in zip(edges, both, strict=True)]
@@ -507,6 +510,11 @@ def is_family_file(path: Source) -> bool:
     return _family_table(path) is not None
 
 
+#: Options that leave rows with intervals out, and how the command line says so.
+_DROPS = ("drop_self_loops", "drop_zeros")
+_DROP_LOOPS, _DROP_ZEROS = "drop all with --drop-self-loops", "drop all with --drop-zeros"
+
+
 class _FamilyTable(NamedTuple):
     """A table whose header names intervals, or edges that may fail."""
 
@@ -536,9 +544,12 @@ def _family_table(path: Source) -> _FamilyTable | None:
 
 
 def _interval_rows(
-    path: Source, orientation: str, share: Fraction, undirected: bool
-) -> tuple[list[str], list[Interval]] | None:
-    """Return nodes and rows of an edge list whose header names intervals or optional edges; None of other files."""
+    path: Source, orientation: str, share: Fraction, undirected: bool, dropped: Collection[str]
+) -> tuple[list[str], list[Interval], str] | None:
+    """Return nodes and rows of an edge list whose header names intervals or optional edges, and what was dropped.
+
+    None of other files.
+    """
     if (table := _family_table(path)) is None:
         return None
     name, data, header, ends, columns, below = table
@@ -570,24 +581,36 @@ def _interval_rows(
     optional = [""] * len(edges) if columns[2] is None else column(columns[2])
     first, second = (column(k) for k in ends[:2])
     rows: dict[tuple[str, str], tuple[int, Interval]] = {}
+    loops = zeros = 0
     for (number, _), source, target, *told in zip(edges, first, second, *numbers, optional, strict=True):
         where = f"{name}, line {number}"
         if not source or not target:
             empty = "target" if source else "source"
             raise FormatError(f"{where}: the {empty} is empty; name a node or remove the row")
+        entry = Entry(f"{where}: edge {_text((source, target))}", source, target, *told)
+        if source == target:
+            if "drop_self_loops" in dropped:
+                loops += 1
+                continue
+            raise FormatError(f"{where}: self-loop at node {shorten(source)}; remove it, or {_DROP_LOOPS}")
+        if entry.always_zero:
+            if "drop_zeros" in dropped:
+                zeros += 1
+                continue
+            raise FormatError(f"{entry.place}: its weight is always 0; remove it, or {_DROP_ZEROS}")
         try:
-            edge = Entry(f"{where}: edge {_text((source, target))}", source, target, *told).interval(share)
+            edge = entry.interval(share)
         except GraphError as error:
             raise FormatError(str(error)) from None
-        if source == target:
-            raise FormatError(f"{where}: self-loop at node {shorten(source)}; remove it")
         if again := next((rows[pair] for pair in _both(edge[:2], undirected) if pair in rows), None):
             mend = "an edge of both signs is two files (modes), or one interval with 0 inside"
             if again[1][:2] != edge[:2]:
                 mend = "--undirected makes each row both directions; keep one, or leave out --undirected"
             raise FormatError(f"{where}: second row for edge {_text(edge)} (the first is line {again[0]}); {mend}")
         rows[edge[:2]] = number, edge
-    return list(nodes), [row for _, row in rows.values()]
+    told = [counted(n, what) for n, what in ((loops, "self-loop"), (zeros, "row of weight 0")) if n]
+    note = f"{shorten(name)}: {' and '.join(told)} dropped" if told else ""
+    return list(nodes), [row for _, row in rows.values()], note
 
 
 def _both(pair: Sequence[str], undirected: bool) -> list[tuple[str, str]]:

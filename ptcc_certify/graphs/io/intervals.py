@@ -51,6 +51,21 @@ class Entry(NamedTuple):
     largest: Any
     optional: Any
 
+    @property
+    def always_zero(self) -> bool:
+        """Whether its weight, or both ends of its interval, are the number 0.
+
+        Examples
+        --------
+        >>> Entry("row 1", "a", "b", None, "0.0", "0", None).always_zero
+        True
+        """
+        ends = (self.weight,) if self.least is None and self.largest is None else (self.least, self.largest)
+        try:
+            return not any(as_fraction(end, "weight") for end in ends)
+        except (NumberError, TypeError):
+            return False
+
     def interval(self, share: Fraction) -> Interval:
         """Return source, target, least and largest weight; ``share`` is the uncertainty of a single weight.
 
