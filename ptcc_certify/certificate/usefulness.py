@@ -39,6 +39,10 @@ LAST = Fraction(1, 100)
 _DIGITS = 3
 
 
+#: A bound of 0 is this small at most once floats are rounded up.
+_NOTHING = 1e-299
+
+
 _LARGEST_CLOCK = 1e12
 #: Up to which multiple of ``rho2`` one is looked for that makes the bound useful.
 _LARGEST = 2e4
@@ -234,7 +238,7 @@ def _use_of_late(late: LateBounds, longest_way: float | None) -> Use:
     caveat = "" if late.inputs is not None else "the input is not proved bounded"
     if math.isinf(late.largest):
         return Use(None, "", caveat)
-    if late.vehicles is not None and not late.largest:
+    if late.largest <= _NOTHING:
         return Use(True, "", caveat)
     way = 1.0 if late.relative else longest_way
     where = "agent within {} of its final state" if late.leaders is None else "follower within {} of its target"
@@ -243,11 +247,14 @@ def _use_of_late(late: LateBounds, longest_way: float | None) -> Use:
 
 
 def _use_of_tracking(tracking: Tracking) -> Use:
-    """Tell whether followers are nearer to their targets at ``0.99 T`` than a hundredth of what is proved at first."""
+    """Tell whether followers are nearer to their targets at ``0.99 T`` than a hundredth of what there was to go.
+
+    That is what is proved at first, or how far the leaders may move by ``T`` if that is farther.
+    """
     first, last = (float(x) for x in tracking.distance_bound([1.0, 0.01]).max(axis=0))
     relative = " from within 1 of it" if tracking.relative else ""
     remark = f"every follower within {up(last, 2)} of its target at 0.99 T{relative}"
-    useful = last <= USEFUL * first
+    useful = last <= max(USEFUL * max(first, float(tracking.leaders.total * tracking.protocol.T)), _NOTHING)
     if tracking.input is not None:
         return Use(useful, remark)
     mend = Change("rho2", tracking.bounding_rho2)

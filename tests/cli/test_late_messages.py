@@ -199,6 +199,20 @@ def test_followers_track_leaders_that_move_and_the_file_says_so() -> None:
     assert "ever after" in sign.out
 
 
+def test_where_nothing_is_proved_of_moving_leaders_the_screen_says_why() -> None:
+    Path("tiny.csv").write_text("l,a,1e-20\na,b,1\nb,a,1\n")
+    run = ptcc("certify", "tiny.csv", "--leader-speed", "1", "--x0", "1,2,3", *QUICK)
+    assert run.code == 4 and "leaders    speed |x_j'| <= 1" in run.out, run
+    assert "TRACKING   nothing is proved: no vector for the followers was found" in run.out
+
+
+@pytest.mark.parametrize("words", [("--delay", "0.01"), ("--leader-speed", "0"), ("--leader-speed", "0.1")])
+def test_agents_that_begin_on_their_targets_are_not_said_to_get_little_nearer(words: tuple[str, ...]) -> None:
+    """Nothing is left but the least float, or what leaders at this speed leave; there was nothing to come nearer by."""
+    run = ptcc("certify", "chain.csv", *words, "--x0", "1,1,-1", *QUICK)
+    assert run.code == 0 and "verdict    certified" in run.out and "little" not in run.out, run
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

@@ -88,6 +88,10 @@ def tracking_facts(certificate: Certificate) -> Facts:
     """Tell how followers track leaders that move."""
     tracking = certificate.tracking
     if tracking is None:
+        if certificate.asked_leaders is not None and certificate.late is None and certificate.asked_messages is None:
+            yield Fact(head="leaders", note=leaders_text(certificate.asked_leaders))
+            text = "nothing is proved: no vector for the followers was found"
+            yield Fact(head="tracking", standing="unproved", note=text, loud=True)
         return
     T = near(certificate.protocol.T)
     yield Fact(head="leaders", note=leaders_text(tracking.leaders))
