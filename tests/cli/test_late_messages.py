@@ -206,7 +206,9 @@ def test_where_nothing_is_proved_of_moving_leaders_the_screen_says_why() -> None
     assert "TRACKING   nothing is proved: no vector for the followers was found" in run.out
 
 
-@pytest.mark.parametrize("words", [("--delay", "0.01"), ("--leader-speed", "0"), ("--leader-speed", "0.1")])
+@pytest.mark.parametrize(
+    "words", [("--delay", "0.01"), ("--leader-speed", "0"), ("--leader-speed", "0.1", "--rho2", "4")]
+)
 def test_agents_that_begin_on_their_targets_are_not_said_to_get_little_nearer(words: tuple[str, ...]) -> None:
     """Nothing is left but the least float, or what leaders at this speed leave; there was nothing to come nearer by."""
     run = ptcc("certify", "chain.csv", *words, "--x0", "1,1,-1", *QUICK)
