@@ -313,6 +313,33 @@ def beside(draw: Draw) -> tuple[int, list[str], dict[str, str]]:
     return family.n_nodes, command, files
 
 
+def vehicles(draw: Draw) -> tuple[int, list[str], dict[str, str]]:
+    """Return double integrators that exchange virtual positions: late, led, with uncertain weights, in families."""
+    rng, count = np.random.default_rng(draw.getrandbits(32)), draw.randint(1, 4)
+    if draw.random() < 0.5:
+        family = led_family(rng, count, draw.randint(1, 12), draw.randint(1, 3))
+        n, labels = family.n_nodes, family.labels
+        files = {f"m{k}.csv": text_of_mode(mode, labels) for k, mode in enumerate(family.modes)}
+        command, delay = ["certify", *files, "--switching"], draw.number(1e-4, 0.1)
+        follows = {labels[t] for mode in family.modes for t in mode.target.tolist()}
+    else:
+        graph = led_graph(rng, count, max(1, min(draw.size(), 130) - count), acyclic=draw.random() < 0.5)
+        n, labels = graph.n_nodes, graph.labels
+        delays = {(s, t): Fraction(draw.choice(["0", "1/100", "0.03"])) for s, t, _ in graph.edges()}
+        command, files = ["certify", "g.csv"], {"g.csv": text_of(graph, delays if draw.random() < 0.4 else None)}
+        delay = "delay" if "delay" in files["g.csv"].partition("\n")[0] else draw.number(1e-4, 0.1)
+        command += draw.choice([_quick(draw), ["--uncertainty", draw.choice(["1%", "10%", "1/3"])]])
+        follows = {t for _, t, _ in graph.edges()}
+    command += ["--agents", "double-integrator", "--exchange", "virtual", *draw.gain(), *draw.asked()]
+    command += draw.sometimes(0.8, "--delay", delay) + draw.sometimes(0.3, "--leader-speed", draw.number(0.01, 2))
+    command += draw.sometimes(0.2, "--quantisation", draw.number(1e-3, 1))
+    command += draw.sometimes(0.5, "--gain-cap", draw.number(2, 50)) + draw.sometimes(0.3, "--max-residual", "0.1")
+    values = ("0", "1", "-2", "0.25")
+    command += draw.sometimes(0.7, "--x0", ",".join(draw.choice(values) for _ in labels))
+    velocities = ",".join(draw.choice(values) if label in follows else "0" for label in labels)
+    return n, [*command, *draw.sometimes(0.4, "--v0", velocities)], files
+
+
 def design(draw: Draw) -> tuple[int, list[str], dict[str, str]]:
     """Return a search of gains within a limit of the input."""
     graph, files, _ = _one(draw, most=60)
@@ -336,6 +363,7 @@ KINDS: dict[str, Callable[[Draw], tuple[int, list[str], dict[str, str]]]] = {
     "late": late,
     "leaders": leaders,
     "beside": beside,
+    "vehicles": vehicles,
     "design": design,
 }
 
