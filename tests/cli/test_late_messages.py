@@ -58,6 +58,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     Path("team.csv").write_text(TEAM)
     Path("chain.csv").write_text(CHAIN)
     Path("none.csv").write_text("a\nb\n")
+    Path("bare.csv").write_text("a,b,1\n")
     Path("group.csv").write_text("a,b,1\nb,a,1\nb,c,1\n")
     return tmp_path
 
@@ -237,12 +238,13 @@ def test_agents_that_begin_on_their_targets_are_not_said_to_get_little_nearer(wo
         (("team.csv", "--leader-speed", "1", "--gain-cap", "9"), "--gain-cap: leaders that move are tracked at T by a"),
         (("team.csv", "--leader-speed", "1", "--stop-before", "0.1"), "--stop-before: leaders that move are tracked"),
         (("team.csv", "--leader-speed", "1", "--noise", "1"), "noise is not proved while leaders move"),
-        (("team.csv", "--uncertainty", "1%", "--delay", "none"), 'no column "none"; begin with a header'),
+        (("team.csv", "--uncertainty", "1%", "--delay", "none"), 'no column "none"; add it, or name one of source'),
         (("team.csv", "--uncertainty", "1%", "--delta", "1"), "--delta is for one graph, not for families yet"),
         (("team.csv", "--uncertainty", "1%", "--gain-cap", "9"), "--gain-cap is for one graph, not for families yet"),
         (("team.csv", "--uncertainty", "1%", "--max-residual", "1"), "--max-residual is asked of late messages"),
         (("team.csv", "--delay", "1e"), "give a number in your unit of time, or the name of a column"),
-        (("team.csv", "--delay", "latency"), 'team.csv, line 1: no column "latency"; begin with a header'),
+        (("team.csv", "--delay", "latency"), 'team.csv, line 1: no column "latency"; add it, or name one of'),
+        (("bare.csv", "--delay", "lag"), 'line 1: no column "lag"; begin with a header source,target,weight,lag'),
         (("team.csv", "--packet-loss", "3"), "--packet-loss says nothing by itself; give --period"),
         (("team.csv", "--own-delay"), "--own-delay says nothing by itself; give --delay"),
         (  # the pair of allies has the eigenvalue 2: pi/2 / (2 * 0.1)

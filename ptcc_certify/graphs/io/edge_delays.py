@@ -56,7 +56,10 @@ def read_delays(path: Source, graph: SignedDigraph | Family, title: str = "delay
         titles, ends = list(told.titles), (told.source, told.target, told.weight)
     at = find(titles, [title.lower()], place)
     if at is None:
-        raise FormatError(f'{place}: no column "{shorten(title)}"; begin with a header source,target,weight,{title}')
+        mend = f"begin with a header source,target,weight,{shorten(title)}"
+        if edge_columns(titles, place) is not None:
+            mend = f"add it, or name one of {', '.join(map(shorten, titles))}"
+        raise FormatError(f'{place}: no column "{shorten(title)}"; {mend}')
     first, second, _ = ends if graph.read.get("orientation") != "listens" else (ends[1], ends[0], None)
     delays: dict[tuple[str, str], Fraction] = {}
     known: dict[str, Fraction] = {}  # many edges, few delays
