@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-from ptcc_certify.errors import Change, HypothesisError, ParameterError
+from ptcc_certify.errors import HypothesisError, ParameterError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.base import Protocol, refuse_no_protocol
@@ -35,6 +35,7 @@ _NOT_OF_AGENTS = {
 _NO_SET = "is not taken up here, bounds are from one initial state; leave it out, and give x0"
 #: What is not proved of double integrators that exchange virtual positions, of all that may be asked.
 _NOT_OF_VEHICLES = ("stop_before", "sample_period", "noise", "delta", "disturbance", "initial_set", "sigma0")
+_WORDS_OF_VEHICLES = {"protocol": "the sliding-mode protocol ", "signal": "a restricted signal "}
 #: What is not certified beside late messages, and what to do instead.
 _NOT_LATE = {
     "initial_set": _NO_SET,
@@ -127,20 +128,20 @@ def refuse_beside_virtual_positions(case: Case) -> None:
     >>> agents, limits = Agents(order=2, exchange="virtual"), GainLimits(stop_before="0.1")
     >>> refuse_beside_virtual_positions(Case("fig1a", NominalProtocol(), agents=agents, limits=limits))
     Traceback (most recent call last):
-    ptcc_certify.errors.ParameterError: stop_before is not proved yet where virtual positions are exchanged; leave it \
-or exchange out
+    ptcc_certify.errors.ParameterError: stop_before is not proved yet where virtual positions are exchanged; leave \
+it out
     """
-    given = ["protocol"] * case.sliding + [name for name in _NOT_OF_VEHICLES if case.given(name) is not None]
-    if case.leaders is not None:
-        given += ["delta"] * (case.leaders.disturbance > 0) + ["sign_gain"] * (case.leaders.sign_gain is not None)
-    if case.messages is not None and case.messages.own_delay:
-        given.append("own_delay")
-    if case.signal != "any":
-        given.append("signal")
-    if given:
-        what = {"protocol": "the sliding-mode protocol ", "signal": "a restricted signal "}.get(given[0], "")
-        why = f"{what}is not proved yet where virtual positions are exchanged; leave it or "
-        raise ParameterError(given[0], (why, Change("exchange"), " out"))
+    leaders, messages = case.leaders, case.messages
+    asked = {"protocol": case.sliding} | {name: case.given(name) is not None for name in _NOT_OF_VEHICLES}
+    asked |= {
+        "delta": asked["delta"] or (leaders is not None and leaders.disturbance > 0),
+        "sign_gain": leaders is not None and leaders.sign_gain is not None,
+        "own_delay": messages is not None and messages.own_delay,
+        "signal": case.signal != "any",
+    }
+    if name := next((name for name, given in asked.items() if given), None):
+        what = _WORDS_OF_VEHICLES.get(name, "")
+        raise ParameterError(name, f"{what}is not proved yet where virtual positions are exchanged; leave it out")
 
 
 def asked_of_single_integrators(case: Case) -> list[str]:
