@@ -483,6 +483,9 @@ class FamilyProof(Proof):
     def deviation_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
         """Bound of ``|x_k(t) - x_k(T)|`` for every agent and every signal, as :meth:`input_bound` bounds the input.
 
+        With nothing late, leaders at rest and an unlimited gain; otherwise, and of vehicles, ``late`` and ``tracking``
+        tell.
+
         Parameters
         ----------
         remaining : (M,) array_like

@@ -299,7 +299,9 @@ class GraphProof(Proof):
     def deviation_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
         """Bound of ``|x_k(t) - x_k(T)|`` from the initial state, for every agent.
 
-        Under the sliding-mode protocol it holds whatever the disturbance.
+        Under the sliding-mode protocol it holds whatever the disturbance. It is of single integrators that hear each
+        other at once, with leaders at rest and an unlimited gain; what of these was asked for otherwise, virtual
+        positions too, ``late`` and ``tracking`` bound.
 
         Parameters
         ----------
