@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import os
 import re
+from collections import Counter
 from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -510,9 +511,8 @@ def is_family_file(path: Source) -> bool:
     return _family_table(path) is not None
 
 
-#: Options that leave rows with intervals out, and how the command line says so.
+#: Options that leave rows with intervals out.
 _DROPS = ("drop_self_loops", "drop_zeros")
-_DROP_LOOPS, _DROP_ZEROS = "drop all with --drop-self-loops", "drop all with --drop-zeros"
 
 
 class _FamilyTable(NamedTuple):
@@ -581,23 +581,16 @@ def _interval_rows(
     optional = [""] * len(edges) if columns[2] is None else column(columns[2])
     first, second = (column(k) for k in ends[:2])
     rows: dict[tuple[str, str], tuple[int, Interval]] = {}
-    loops = zeros = 0
+    left_out = Counter[str]()
     for (number, _), source, target, *told in zip(edges, first, second, *numbers, optional, strict=True):
         where = f"{name}, line {number}"
         if not source or not target:
             empty = "target" if source else "source"
             raise FormatError(f"{where}: the {empty} is empty; name a node or remove the row")
         entry = Entry(f"{where}: edge {_text((source, target))}", source, target, *told)
-        if source == target:
-            if "drop_self_loops" in dropped:
-                loops += 1
-                continue
-            raise FormatError(f"{where}: self-loop at node {shorten(source)}; remove it, or {_DROP_LOOPS}")
-        if entry.always_zero:
-            if "drop_zeros" in dropped:
-                zeros += 1
-                continue
-            raise FormatError(f"{entry.place}: its weight is always 0; remove it, or {_DROP_ZEROS}")
+        if (kind := _kind_to_drop(entry, where, dropped)) is not None:
+            left_out[kind] += 1
+            continue
         try:
             edge = entry.interval(share)
         except GraphError as error:
@@ -608,9 +601,23 @@ def _interval_rows(
                 mend = "--undirected makes each row both directions; keep one, or leave out --undirected"
             raise FormatError(f"{where}: second row for edge {_text(edge)} (the first is line {again[0]}); {mend}")
         rows[edge[:2]] = number, edge
-    told = [counted(n, what) for n, what in ((loops, "self-loop"), (zeros, "row of weight 0")) if n]
-    note = f"{shorten(name)}: {' and '.join(told)} dropped" if told else ""
+    dropped_rows = " and ".join(counted(left_out[kind], kind) for kind in sorted(left_out, reverse=True))
+    note = f"{shorten(name)}: {dropped_rows} dropped" if left_out else ""
     return list(nodes), [row for _, row in rows.values()], note
+
+
+def _kind_to_drop(entry: Entry, where: str, dropped: Collection[str]) -> str | None:
+    """Return what a row is that an option drops, and refuse it without that option; None of every other row."""
+    if entry.source == entry.target:
+        if "drop_self_loops" in dropped:
+            return "self-loop"
+        mend = "remove it, or drop all with --drop-self-loops"
+        raise FormatError(f"{where}: self-loop at node {shorten(entry.source)}; {mend}")
+    if entry.always_zero:
+        if "drop_zeros" in dropped:
+            return "row of weight 0"
+        raise FormatError(f"{entry.place}: its weight is always 0; remove it, or drop all with --drop-zeros")
+    return None
 
 
 def _both(pair: Sequence[str], undirected: bool) -> list[tuple[str, str]]:
