@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from agent_cases import agent_case
 
 from ptcc_certify.certificate.agents_part import AgentsPart
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.initial_state import InitialState
 

@@ -15,7 +15,7 @@ import time
 from fractions import Fraction
 from pathlib import Path
 
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.examples import Example, load_graph, select
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.initial_state import InitialState

@@ -22,8 +22,8 @@ import numpy as np
 
 from ptcc_certify import NominalProtocol, read_graph
 from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.certificate.family_proof import ComponentProof
-from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.model.asks import Asks
 

@@ -14,7 +14,7 @@ import resource
 import time
 from fractions import Fraction
 
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 

@@ -27,7 +27,7 @@ from ptcc_certify.bounds.delay_lmi import DelayLMIBounds
 from ptcc_certify.bounds.final_state import final_state
 from ptcc_certify.bounds.late_messages import LateBounds, bound_late
 from ptcc_certify.bounds.small_delays import SmallDelayBounds, delay_threshold
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.model import NominalProtocol
 from ptcc_certify.model.asks import Asks

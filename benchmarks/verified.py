@@ -28,7 +28,7 @@ from generators import random_graph
 from scale import generated
 
 import ptcc_certify as ptcc
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.cli.verified import executable
 from ptcc_certify.examples import load_graph
 from ptcc_certify.model.asks import Asks

@@ -4,8 +4,8 @@ With ``A`` the mean mode, ``b`` a share of twice its slowest eigenvalue, the Lya
 
     P A + A' P - b P = Q,        Q = sum_i (H_i diag(tau_i) H_i' + P_0 F_i diag(r_i^2 / tau_i) F_i' P_0),
 
-has a solution ``P`` that is prepared, to first order, for what the inequality of :mod:`lmi.common` takes off: ``P_0``
-and ``tau`` are those of the last solution; at first ``Q`` is made of ``H_i`` and ``A_i``.
+has a solution ``P`` that is prepared, to first order, for what the inequality of :mod:`lmi.common_lyapunov` takes off:
+``P_0`` and ``tau`` are those of the last solution; at first ``Q`` is made of ``H_i`` and ``A_i``.
 
 Given ``P``, in coordinates in which it is the identity, the best multipliers of
 ``C(tau) = A_i + A_i' - H diag(tau) H' - F diag(1 / tau) F'`` fulfil ``tau_e^2 = (f_e' X f_e) / (h_e' X h_e)`` with a
@@ -20,7 +20,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lmi.common import CommonCertificate, UncertainMatrix, evaluate
+from lmi.common_lyapunov import CommonCertificate, UncertainMatrix, evaluate
 from lmi.errors import NoCertificate
 from lmi.search_time import spend
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lmi import child_process
-from lmi.common import (
+from lmi.common_lyapunov import (
     CommonCertificate,
     UncertainMatrix,
     common_lyapunov,

@@ -58,9 +58,9 @@ _EXPORTS = {
     "as_family": "graphs.io",
     "read_family": "graphs.io",
     "decide": "theorems.family_behaviour",
-    "DwellTime": "model.restricted_signals",
-    "JointWindows": "model.restricted_signals",
-    "ClockShares": "model.restricted_signals",
+    "DwellTime": "model.constrained_switching",
+    "JointWindows": "model.constrained_switching",
+    "ClockShares": "model.constrained_switching",
     # Protocols, disturbances, actuators
     "Agents": "model.agents",
     "companion_form": "model.companion",
@@ -80,7 +80,7 @@ _EXPORTS = {
     "simulate_tracking": "simulation.moving_leaders",
     "Trajectory": "simulation.trajectory",
     # Certificates
-    "certify": "certificate.procedure",
+    "certify": "certificate.certification",
     "Certificate": "certificate.certificate",
     "Asks": "model.asks",
     "Expectations": "model.asks",

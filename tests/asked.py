@@ -6,9 +6,9 @@ from dataclasses import fields, replace
 from typing import Any
 
 from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.certification import certify, certify_case
+from ptcc_certify.certificate.family_certification import certify_family as take_steps
 from ptcc_certify.certificate.family_proof import FamilyProof
-from ptcc_certify.certificate.family_steps import certify_family as take_steps
-from ptcc_certify.certificate.procedure import certify, certify_case
 from ptcc_certify.certificate.request import Question, read_initial_state, read_request, read_sliding_variable
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import analyse

@@ -32,7 +32,7 @@ IN_ROOMS = {
     "graphs.io": ("read_state",),
     "graphs.structure": ("ClosedComponent", "WeakComponent"),
     "theorems.claims": ("Claim",),
-    "model.restricted_signals": ("DwellTime", "JointWindows", "ClockShares"),
+    "model.constrained_switching": ("DwellTime", "JointWindows", "ClockShares"),
     "theorems.table": ("THEOREMS", "theorem_for"),
     "theorems.lemmas": (
         "gauge",
@@ -56,7 +56,7 @@ IN_ROOMS = {
     "bounds.input.effort": ("Effort",),
     "bounds.input.initial_set": ("initial_set_within",),
     "bounds.input.worst_initial_state": ("WorstInitialState",),
-    "certificate.answer": ("Assessment",),
+    "certificate.exit_code": ("Assessment",),
     "certificate.certificate_file": ("RejectedCertificate",),
     "checker": ("CheckReport",),
     "checker.input_formulas": ("InitialSet",),

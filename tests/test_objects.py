@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import ptcc_certify as ptcc
-from ptcc_certify.certificate.procedure import certify_case
+from ptcc_certify.certificate.certification import certify_case
 from ptcc_certify.errors import FormatError, ParameterError
 from ptcc_certify.model.case import Case
 from ptcc_certify.model.disturbance import as_disturbance

@@ -21,7 +21,7 @@ def test_every_export_is_there_and_stays_what_it_is():
 
 
 def test_a_function_at_the_top_keeps_its_signature_and_is_pickled_by_its_name():
-    from ptcc_certify.certificate.procedure import certify
+    from ptcc_certify.certificate.certification import certify
 
     assert inspect.signature(ptcc_certify.certify) == inspect.signature(inspect.unwrap(certify))
     assert pickle.loads(pickle.dumps(ptcc_certify.certify)) is ptcc_certify.certify  # noqa: S301 - our own

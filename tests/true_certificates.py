@@ -16,8 +16,8 @@ from side_files import with_factors, with_side_files
 
 from ptcc_certify.bounds import final_state as final_states
 from ptcc_certify.bounds.input.initial_set import box, ellipsoid
-from ptcc_certify.certificate import graph_steps
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate import graph_certification
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
@@ -49,7 +49,7 @@ def made(name: str, seed: int, slides: bool = False, large: bool = False, **opti
         start = None
     with pytest.MonkeyPatch.context() as patch:
         if large:
-            patch.setattr(graph_steps, "EXACT_NODES", 0)
+            patch.setattr(graph_certification, "EXACT_NODES", 0)
             patch.setattr(final_states, "EXACT_NODES", 0)
         certificate = certify_words(graph, protocol, start, simulation=False, **options)
         return {**json.loads(certificate.to_json()), "unverified": {}}

@@ -59,7 +59,7 @@ from threadpoolctl import threadpool_limits
 from lmi.exact.decimal_rounding import float_down, float_up
 from ptcc_certify.batch.settings import Settings, StateLike
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.errors import PTCCError, explain, one_line
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import random_states, read_graph, read_state

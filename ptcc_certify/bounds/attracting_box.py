@@ -32,7 +32,7 @@ from lmi.dyadic import dyadic_array
 from lmi.exact.numbers import integers
 from lmi.exact.work import WorkError
 from lmi.sparse_h_matrix import solve
-from ptcc_certify.checker.restricted_signals import reachable_bounds
+from ptcc_certify.checker.constrained_switching import reachable_bounds
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.structure import find_camps

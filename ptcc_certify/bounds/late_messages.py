@@ -29,14 +29,14 @@ from lmi.errors import LMIError, NoCertificate
 from lmi.exact.decimal_rounding import float_up, up
 from lmi.exact.elementary_enclosures import log, rounded
 from ptcc_certify.bounds.delay_lmi import DelayLMIBound
+from ptcc_certify.bounds.float_conversion import floats, floats_up
 from ptcc_certify.bounds.late_steps import Steps, bound_steps, search_steps
 from ptcc_certify.bounds.missed_deadline import Missed, find_missed
-from ptcc_certify.bounds.section_numbers import floats, floats_up
 from ptcc_certify.bounds.settling_leaders import Settling
 from ptcc_certify.bounds.small_delays import SmallDelays, left_above
 from ptcc_certify.bounds.staged_deadlines import stage_deadlines
 from ptcc_certify.bounds.tracking import drift_integral
-from ptcc_certify.bounds.vehicles import VehicleBounds, bound_vehicles, read_vehicles, vehicles_section
+from ptcc_certify.bounds.virtual_positions import VehicleBounds, bound_vehicles, read_vehicles, vehicles_section
 from ptcc_certify.checker.delay_lmi import LateLMI, LateLMIWitness
 from ptcc_certify.checker.input_formulas import BITS, Limits
 from ptcc_certify.checker.late_drift import drift_above
@@ -58,7 +58,7 @@ from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.limited_gain import LimitedGain
 from ptcc_certify.model.moving_leaders import MovingLeaders
-from ptcc_certify.model.vehicles import TrackingProtocol, Vehicles
+from ptcc_certify.model.virtual_positions import TrackingProtocol, Vehicles
 from ptcc_certify.theorems.theorem import Obligation
 
 #: Up to so many followers many ``q`` are tried; beyond, the best of those that one vector proves.

@@ -19,7 +19,7 @@ import numpy as np
 
 from lmi.errors import LMIError, NoCertificate
 from lmi.exact.decimal_rounding import float_up, up
-from ptcc_certify.bounds.section_numbers import floats, floats_up
+from ptcc_certify.bounds.float_conversion import floats, floats_up
 from ptcc_certify.checker.leaders import LeadersAsked, LeadersSection
 from ptcc_certify.checker.obligations import CheckReport
 from ptcc_certify.checker.sections import RowVector

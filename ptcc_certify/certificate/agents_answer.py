@@ -19,8 +19,8 @@ from ptcc_certify.bounds.agents import States, first_inputs
 from ptcc_certify.bounds.agents_comparison import AgentsComparison
 from ptcc_certify.bounds.enclosed_ends import agents_ends, weighted_sum
 from ptcc_certify.bounds.final_state import Influence, NotEnclosedError
-from ptcc_certify.bounds.section_numbers import fractions
-from ptcc_certify.certificate.answer import MET, OPEN, REFUTED, Answer
+from ptcc_certify.bounds.float_conversion import fractions
+from ptcc_certify.certificate.exit_code import MET, OPEN, REFUTED, Answer
 from ptcc_certify.checker.agent_bounds import AgentsInput, UsedSection
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.errors import Change, ParameterError, Sentence

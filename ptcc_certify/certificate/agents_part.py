@@ -25,8 +25,8 @@ from ptcc_certify.bounds.agents import (
 from ptcc_certify.bounds.agents_comparison import AgentsComparison, compare_agents
 from ptcc_certify.bounds.enclosed_ends import agents_ends
 from ptcc_certify.bounds.final_state import Influence
+from ptcc_certify.bounds.float_conversion import numbers
 from ptcc_certify.bounds.input.tightest_bound import round_up
-from ptcc_certify.bounds.section_numbers import numbers
 from ptcc_certify.certificate.agents_answer import (
     AgentsAnswer,
     Intervals,

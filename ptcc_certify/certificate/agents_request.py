@@ -25,7 +25,7 @@ from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.parameters import readable
 from ptcc_certify.model.refusals import asked_of_single_integrators, refuse_agents, refuse_beside_virtual_positions
-from ptcc_certify.model.vehicles import Vehicles, one_cap
+from ptcc_certify.model.virtual_positions import Vehicles, one_cap
 
 
 class Chains(NamedTuple):

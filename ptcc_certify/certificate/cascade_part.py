@@ -25,7 +25,7 @@ from ptcc_certify.bounds.cascade import (
     root_of,
 )
 from ptcc_certify.bounds.final_state import Influence
-from ptcc_certify.bounds.section_numbers import numbers
+from ptcc_certify.bounds.float_conversion import numbers
 from ptcc_certify.certificate.agents_answer import (
     AgentsAnswer,
     Intervals,

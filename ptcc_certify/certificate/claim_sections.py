@@ -11,8 +11,7 @@ import numpy as np
 
 from lmi.exact.numbers import longest
 from ptcc_certify.bounds.family_final_state import ValueEnds
-from ptcc_certify.certificate.functions import Proved, rates_of
-from ptcc_certify.certificate.restricted_claims import (
+from ptcc_certify.certificate.constrained_switching.claims import (
     Claim,
     FinalValueClaim,
     LastModeClaim,
@@ -20,11 +19,9 @@ from ptcc_certify.certificate.restricted_claims import (
     ShareClaim,
     WindowClaim,
 )
+from ptcc_certify.certificate.functions import Proved, rates_of
 from ptcc_certify.checker.constant_weights import FinalValue, FinalValueSection
-from ptcc_certify.checker.family_function import Multipliers
-from ptcc_certify.checker.family_limits import EQUAL
-from ptcc_certify.checker.reading import Interval
-from ptcc_certify.checker.restricted_signals import (
+from ptcc_certify.checker.constrained_switching import (
     Dwell,
     KeptMean,
     LastModeSection,
@@ -35,12 +32,15 @@ from ptcc_certify.checker.restricted_signals import (
     Windows,
     WindowsSection,
 )
+from ptcc_certify.checker.family_function import Multipliers
+from ptcc_certify.checker.family_limits import EQUAL
+from ptcc_certify.checker.reading import Interval
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, find_camps
 from ptcc_certify.lyapunov.clock_shares import ShareForm
 from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends
 from ptcc_certify.lyapunov.mode_forms import ModeForms
-from ptcc_certify.model.restricted_signals import ClockShares, DwellTime, JointWindows, SignalClass
+from ptcc_certify.model.constrained_switching import ClockShares, DwellTime, JointWindows, SignalClass
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
 from ptcc_certify.theorems.joint_windows import contraction
 from ptcc_certify.theorems.theorem import Obligation

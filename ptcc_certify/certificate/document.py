@@ -16,6 +16,7 @@ from ptcc_certify.certificate.agents_part import AgentsPart, matrix_section, pha
 from ptcc_certify.certificate.cascade_part import CascadePart, cascade_section
 from ptcc_certify.certificate.checking import record
 from ptcc_certify.certificate.claim_sections import ball, claim_section, claim_steps
+from ptcc_certify.certificate.constrained_switching.claims import Claim
 from ptcc_certify.certificate.evidence import Evidence
 from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.final_state_sections import final_state_sections, formation_section
@@ -39,7 +40,6 @@ from ptcc_certify.certificate.graph_sections import (
     structure_section,
 )
 from ptcc_certify.certificate.proof import Proof
-from ptcc_certify.certificate.restricted_claims import Claim
 from ptcc_certify.certificate.section_writer import Writer, write
 from ptcc_certify.certificate.unverified import write_unverified
 from ptcc_certify.checker import NOT_OF_FAMILIES, SCHEMA, SLIDING_BOUND, SLIDING_CLOCK
@@ -47,6 +47,7 @@ from ptcc_certify.checker.agent_cascade import CascadeSection
 from ptcc_certify.checker.agent_decrease import PhaseSection
 from ptcc_certify.checker.agent_instants import InstantsSection
 from ptcc_certify.checker.agents import AgentsSection
+from ptcc_certify.checker.constrained_switching import Section
 from ptcc_certify.checker.family_bounds import FamilyInput
 from ptcc_certify.checker.family_limits import EQUAL
 from ptcc_certify.checker.family_rows import FamilyFunctionsSection
@@ -57,7 +58,6 @@ from ptcc_certify.checker.messages import MessagesSection
 from ptcc_certify.checker.obligations import CheckReport
 from ptcc_certify.checker.protocol import ReachingTimes, SlidingPart
 from ptcc_certify.checker.rates import OvershootSection, RatesSection
-from ptcc_certify.checker.restricted_signals import Section
 from ptcc_certify.checker.sections import Ball, ByAgent, Several
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.theorem_function import PaperSection

@@ -16,11 +16,11 @@ from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.certificate.proof import OfQuestion
 from ptcc_certify.certificate.request import Question
+from ptcc_certify.display import Shown
 from ptcc_certify.errors import ParameterError, PTCCError, SimulationError, unknown_parameter
 from ptcc_certify.lyapunov.search import Search
 from ptcc_certify.model.disturbance import ExpressionDisturbance
 from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.shown import Shown
 from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.simulation.late_messages import can_run, simulate_late
 from ptcc_certify.simulation.run import simulate
@@ -285,7 +285,7 @@ class Evidence(OfQuestion, Shown):
             late, tracking = proof.late, proof.tracking
             start = [float(x) for x in proof.initial_state]
             if late is not None and late.tracking_protocol is not None:
-                from ptcc_certify.simulation.vehicles import run_of_vehicles
+                from ptcc_certify.simulation.virtual_positions import run_of_vehicles
 
                 return run_of_vehicles(
                     proof.graph, proof.protocol, late.tracking_protocol, late.messages, start, late.leaders

@@ -27,9 +27,7 @@ from ptcc_certify.bounds.heard_deviation import HeardRows
 from ptcc_certify.bounds.kept_means import LeadingGroup, leading_groups
 from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.bounds.undriven_part import FunctionOf, UndrivenPart
-from ptcc_certify.certificate.functions import ProvedFunction
-from ptcc_certify.certificate.proof import Proof
-from ptcc_certify.certificate.restricted_claims import (
+from ptcc_certify.certificate.constrained_switching.claims import (
     Claim,
     FinalValueClaim,
     LastModeClaim,
@@ -37,6 +35,8 @@ from ptcc_certify.certificate.restricted_claims import (
     ShareClaim,
     WindowClaim,
 )
+from ptcc_certify.certificate.functions import ProvedFunction
+from ptcc_certify.certificate.proof import Proof
 from ptcc_certify.checker.family_bounds import deviations, ends_near, peaks
 from ptcc_certify.checker.family_function import Scaled
 from ptcc_certify.checker.family_limits import WeightedMean, agents_heard, limits
@@ -53,7 +53,7 @@ from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound
 from ptcc_certify.lyapunov.follower_function import FollowerFunction
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.squares_function import SquaresFunction
-from ptcc_certify.model.restricted_signals import SignalClass
+from ptcc_certify.model.constrained_switching import SignalClass
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 from ptcc_certify.theorems.family_kernel import UNKNOWN
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ptcc_certify.bounds.enclosed_ends import agents_ends, influence_balls
 from ptcc_certify.bounds.final_state import FinalState, Influence, rounding_radius
-from ptcc_certify.bounds.section_numbers import numbers
+from ptcc_certify.bounds.float_conversion import numbers
 from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.certificate.section_writer import LONG, Writer, exact_or_ball, interval_text
 from ptcc_certify.checker.final_state import FormationSection, InfluenceSection, LeftNullVector

@@ -13,16 +13,16 @@ from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.bounds.missed_deadline import Missed
 from ptcc_certify.bounds.tracking import Tracking
-from ptcc_certify.certificate.answer import MET, OPEN, REFUTED, Answer
+from ptcc_certify.certificate.constrained_switching.claims import LastModeClaim
+from ptcc_certify.certificate.constrained_switching.reasons import reasons_for_none
+from ptcc_certify.certificate.exit_code import MET, OPEN, REFUTED, Answer
 from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.graph_proof import GraphProof
-from ptcc_certify.certificate.restricted_claims import LastModeClaim
-from ptcc_certify.certificate.restricted_reasons import reasons_for_none
 from ptcc_certify.errors import Change, Sentence, joined
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.model.base import Protocol
-from ptcc_certify.model.restricted_signals import ClockShares, JointWindows
+from ptcc_certify.model.constrained_switching import ClockShares, JointWindows
 from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 from ptcc_certify.theorems.family_claims import component_holds, component_refutation

@@ -25,13 +25,13 @@ from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.model import Protocol
 from ptcc_certify.model.asks import Expectations
 from ptcc_certify.model.case import Case
+from ptcc_certify.model.constrained_switching import SignalClass, read_signal
 from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.parameters import parameter
 from ptcc_certify.model.reaching_time import ReachingTime, certified_reaching_times
-from ptcc_certify.model.restricted_signals import SignalClass, read_signal
 
 #: Longest weights and initial states, over a common denominator: so many bits over ``N^(5/4)``, for seconds of work.
 LONGEST_BITS = 470_000

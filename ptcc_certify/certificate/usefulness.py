@@ -24,9 +24,9 @@ from ptcc_certify.bounds.envelope import Envelope
 from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.bounds.tracking import Tracking
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
+from ptcc_certify.certificate.constrained_switching.bounds import deviation_of_signal
 from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.graph_proof import GraphProof
-from ptcc_certify.certificate.restricted_bounds import deviation_of_signal
 from ptcc_certify.checker.input_formulas import InitialSet, root_above
 from ptcc_certify.errors import Change, Sentence, joined
 from ptcc_certify.lyapunov.search import USEFUL

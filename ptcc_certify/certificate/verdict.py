@@ -8,7 +8,8 @@ to try next where nothing was decided; and which expectation was met, refuted or
 
 from __future__ import annotations
 
-from ptcc_certify.certificate.answer import (
+from ptcc_certify.certificate.evidence import Evidence
+from ptcc_certify.certificate.exit_code import (
     CERTIFIED,
     OPEN,
     Assessment,
@@ -17,7 +18,6 @@ from ptcc_certify.certificate.answer import (
     standing,
     verdict_of,
 )
-from ptcc_certify.certificate.evidence import Evidence
 from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.judgements import judge
 from ptcc_certify.certificate.usefulness import Use, use_of

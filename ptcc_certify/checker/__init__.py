@@ -25,6 +25,7 @@ from lmi.exact import arithmetic
 from lmi.exact.work import Account, WorkError, limited
 from ptcc_certify.checker.agents import check_agents
 from ptcc_certify.checker.attracting_boxes import check_boxes
+from ptcc_certify.checker.constrained_switching import check_restricted
 from ptcc_certify.checker.contents import BRINGS, FamilyCertificate, GraphCertificate
 from ptcc_certify.checker.family import check_family
 from ptcc_certify.checker.family_bounds import check_family_bounds
@@ -49,7 +50,6 @@ from ptcc_certify.checker.protocol import (
 )
 from ptcc_certify.checker.rates import check_rate_bound, check_rates
 from ptcc_certify.checker.reading import SCHEMA, RejectedError, UnreadableError, digest, need, read
-from ptcc_certify.checker.restricted_signals import check_restricted
 from ptcc_certify.checker.sections import declared
 from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.checker.structure import MANY_COMPONENTS, check_claim, check_structure

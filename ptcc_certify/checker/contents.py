@@ -10,6 +10,7 @@ from ptcc_certify.checker.agent_decrease import PhaseSection
 from ptcc_certify.checker.agent_instants import InstantsSection
 from ptcc_certify.checker.agents import AgentsSection
 from ptcc_certify.checker.attracting_boxes import AttractingBox, KeptBox
+from ptcc_certify.checker.constrained_switching import KeptMean, Section
 from ptcc_certify.checker.delay_lmi import LateLMIWitness
 from ptcc_certify.checker.dominance import DominanceWitness
 from ptcc_certify.checker.family import (
@@ -35,7 +36,6 @@ from ptcc_certify.checker.messages import MessagesSection, StepsStart
 from ptcc_certify.checker.missed_deadline import Signs
 from ptcc_certify.checker.protocol import NominalSection, ReachingTimes, SlidingSection
 from ptcc_certify.checker.rates import InertiaWitness, MeanWitness, OvershootSection, RatesSection
-from ptcc_certify.checker.restricted_signals import KeptMean, Section
 from ptcc_certify.checker.sections import (
     Agents,
     Ball,

@@ -30,7 +30,7 @@ from ptcc_certify.checker.rows import Followers, Rows, followers_of
 from ptcc_certify.checker.sections import Agents, ByFollower, FollowerNumbers, Positive, Several
 from ptcc_certify.checker.settling_leaders import SettlingSection, check_settling
 from ptcc_certify.checker.side_files import Numbers
-from ptcc_certify.checker.vehicles import Decay, Vehicles, VehiclesSection
+from ptcc_certify.checker.virtual_positions import Decay, Vehicles, VehiclesSection
 
 #: Witnesses of rows, and instants of steps, that are read.
 MANY_ROWS, MANY_INSTANTS = 100, 2001

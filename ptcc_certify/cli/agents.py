@@ -219,11 +219,11 @@ def refuse_dimension(options: Options, command: str) -> None:
 
 def run_of_agents(case: Case, samples: int) -> AgentsTrajectory:
     """Run agents of order n with the gains that ``ptcc certify`` proves, from their initial states to the deadline."""
-    from ptcc_certify.certificate.procedure import certify_case
+    from ptcc_certify.certificate.certification import certify_case
 
     certificate: Any = certify_case(case)
     if certificate.late is not None and (tracking := certificate.late.tracking_protocol) is not None:
-        from ptcc_certify.simulation.vehicles import simulate_vehicles
+        from ptcc_certify.simulation.virtual_positions import simulate_vehicles
 
         begin = [[float(x) for x in values] for values in (certificate.initial_state, certificate.late.vehicles.v0)]
         return simulate_vehicles(certificate.graph, tracking, *begin, samples=samples)

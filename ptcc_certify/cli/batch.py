@@ -157,7 +157,7 @@ def _tell_rows(rows: list[dict[str, Any]], total: int, output: str | None, resta
 
 def _exit_code(rows: Sequence[dict[str, Any]]) -> int:
     """Return the exit code of the worst row, and tell how many rows are not what one would wish."""
-    from ptcc_certify.certificate.answer import OPEN, REFUTED, exit_code
+    from ptcc_certify.certificate.exit_code import OPEN, REFUTED, exit_code
 
     failed = [row for row in rows if row["error"] is not None]
     violated = sum(row["bound_kept"] is False for row in rows)

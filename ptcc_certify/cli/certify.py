@@ -95,9 +95,9 @@ def _certify_graph(
     options: shared.Options,
 ) -> int:
     """Certify what the protocol does on one graph."""
-    from ptcc_certify.certificate.answer import rejects
-    from ptcc_certify.certificate.graph_steps import STEPS
-    from ptcc_certify.certificate.procedure import certify_case
+    from ptcc_certify.certificate.certification import certify_case
+    from ptcc_certify.certificate.exit_code import rejects
+    from ptcc_certify.certificate.graph_certification import STEPS
     from ptcc_certify.report.facts.of_certificate import facts_of
 
     LOG.info("%s", one_line(f"read {graph}: {signed.n_nodes} nodes, {signed.n_edges} edges"))

@@ -42,7 +42,7 @@ def classify(graph: tuple[str, ...], expect: str | None, as_json: bool, screen: 
         screen.show(lambda details: structure_facts(structure, graph[0]))
     if expect is None:
         return ExitCode.OK
-    from ptcc_certify.certificate.answer import MET
+    from ptcc_certify.certificate.exit_code import MET
     from ptcc_certify.certificate.judgements import judge_behaviour
 
     answer = judge_behaviour(structure, expect)

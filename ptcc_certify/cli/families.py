@@ -24,20 +24,20 @@ from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import OPTIONAL, UNCERTAINTY
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.case import Case
-from ptcc_certify.model.initial_state import InitialState
-from ptcc_certify.model.refusals import NOT_OF_FAMILIES
-from ptcc_certify.model.restricted_signals import (
+from ptcc_certify.model.constrained_switching import (
     CLOCK_DWELL,
     WINDOWS_OF_TIME,
     ClockShares,
     DwellTime,
     JointWindows,
 )
+from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.refusals import NOT_OF_FAMILIES
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
-    from ptcc_certify.model.restricted_signals import SignalClass
+    from ptcc_certify.model.constrained_switching import SignalClass
     from ptcc_certify.theorems.family_behaviour import FamilyComponent
 
 #: Options of certify that families do not take; agents are refused by themselves, disturbances by the protocol.
@@ -223,7 +223,7 @@ def _show_decision(
 
 def _expected(components: Sequence[FamilyComponent], expect: str | None) -> int:
     """Tell on standard error what became of an expectation, and what is left undecided; return the exit code."""
-    from ptcc_certify.certificate.answer import MET, REFUTED
+    from ptcc_certify.certificate.exit_code import MET, REFUTED
     from ptcc_certify.certificate.judgements import judge_family_behaviour
     from ptcc_certify.certificate.verdict import NEXT_STEP
 
@@ -244,10 +244,10 @@ def certify_family(
     graphs: tuple[str, ...], family: Family, output: str | None, as_json: bool, screen: Screen, options: shared.Options
 ) -> int:
     """Certify what the protocol does on a family, whatever the signal."""
-    from ptcc_certify.certificate.answer import CERTIFIED
-    from ptcc_certify.certificate.family_steps import STEPS
-    from ptcc_certify.certificate.procedure import certify_case
-    from ptcc_certify.certificate.restricted_search import require_nominal
+    from ptcc_certify.certificate.certification import certify_case
+    from ptcc_certify.certificate.constrained_switching.search import require_nominal
+    from ptcc_certify.certificate.exit_code import CERTIFIED
+    from ptcc_certify.certificate.family_certification import STEPS
     from ptcc_certify.report.facts.of_certificate import facts_of
     from ptcc_certify.theorems.family_behaviour import decide
 
@@ -299,7 +299,7 @@ def certify_family(
 
 def _judged_alone(components: Sequence[FamilyComponent], expect: str | None, output: str | None) -> int:
     """Tell what became of an expectation of fixed weights, of which no certificate is made; return the exit code."""
-    from ptcc_certify.certificate.answer import MET
+    from ptcc_certify.certificate.exit_code import MET
     from ptcc_certify.certificate.judgements import judge_family_behaviour
 
     code = _expected(components, expect)

@@ -193,8 +193,8 @@ def _of_graphs(graphs: tuple[str, ...], what: str, options: shared.Options) -> A
 
 def _of_family(family: Family, what: str, options: shared.Options) -> Family | Certificate:
     """Return what the figure of a family is drawn from: itself, or its certificate."""
-    from ptcc_certify.certificate.family_steps import STEPS
-    from ptcc_certify.certificate.procedure import certify_case
+    from ptcc_certify.certificate.certification import certify_case
+    from ptcc_certify.certificate.family_certification import STEPS
 
     refuse_options(options)
     refuse_agents_of_family(options, "draw")
@@ -219,8 +219,8 @@ def _of_graph(
     signed: SignedDigraph, what: str, options: shared.Options
 ) -> Certificate | Trajectory | tuple[SignedDigraph, Any]:
     """Return what the figure of a graph is drawn from: itself, a run, or for its decay a certificate."""
-    from ptcc_certify.certificate.graph_steps import STEPS
-    from ptcc_certify.certificate.procedure import certify_case
+    from ptcc_certify.certificate.certification import certify_case
+    from ptcc_certify.certificate.graph_certification import STEPS
     from ptcc_certify.model.agents import Agents
 
     protocol = shared.protocol_of(options, () if what == "decay" else ("delta", "disturbance"))
@@ -251,8 +251,8 @@ def _of_graph(
 
 def _of_agents(signed: SignedDigraph, protocol: Protocol, what: str, options: shared.Options) -> Certificate:
     """Return what the figure of agents of order n is drawn from: a certificate of theirs."""
-    from ptcc_certify.certificate.graph_steps import STEPS
-    from ptcc_certify.certificate.procedure import certify_case
+    from ptcc_certify.certificate.certification import certify_case
+    from ptcc_certify.certificate.graph_certification import STEPS
 
     agents, initial = agents_and_states(options, signed)
     if initial is None:

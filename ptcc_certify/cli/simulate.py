@@ -35,13 +35,13 @@ from ptcc_certify.cli.families import (
 from ptcc_certify.cli.messages import leader_options, leaders_of, message_options, messages_of
 from ptcc_certify.cli.scenario import BESIDE
 from ptcc_certify.cli.terminal import FIGURES, print_lines, refuse_output
+from ptcc_certify.display import rendered
 from ptcc_certify.errors import ExitCode, ParameterError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.case import Case
 from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.model.run import Run
-from ptcc_certify.shown import rendered
 
 if TYPE_CHECKING:
     from fractions import Fraction

@@ -22,7 +22,7 @@ from ptcc_certify.bounds.enclosed_ends import agents_ends
 from ptcc_certify.bounds.shortest_time import shortest_time
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.errors import Change, ParameterError, gated
 from ptcc_certify.gain_design.agents_answer import AgentsDesign
 from ptcc_certify.gain_design.agents_deadlines import Candidate, Search, at_deadline, longest

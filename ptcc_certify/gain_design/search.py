@@ -46,7 +46,7 @@ import numpy as np
 from lmi.exact.decimal_rounding import up
 from ptcc_certify.bounds.input.initial_set import initial_set_within
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker import INPUT_NODES
 from ptcc_certify.checker.input_formulas import InitialSet
 from ptcc_certify.errors import ParameterError

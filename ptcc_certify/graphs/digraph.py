@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
 
+from ptcc_certify.display import Shown
 from ptcc_certify.errors import FormatError, GraphError, NumberError, gated
 from ptcc_certify.graphs.equality import ReadOnly
 from ptcc_certify.graphs.rationals import Exact, as_fraction, shorten, writable
 from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.graphs.tables import first_five, import_pandas, in_all, labels_beside, place_of, refuse_unnamed
 from ptcc_certify.graphs.weights import LARGEST_WEIGHT, SMALLEST_WEIGHT, Weights
-from ptcc_certify.shown import Shown
 
 if TYPE_CHECKING:
     import networkx as nx

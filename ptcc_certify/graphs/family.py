@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lmi.exact.decimal_rounding import counted
+from ptcc_certify.display import Shown
 from ptcc_certify.errors import GraphError, NumberError, did_you_mean, gated
 from ptcc_certify.graphs.digraph import (
     CallableTuple,
@@ -30,7 +31,6 @@ from ptcc_certify.graphs.rationals import as_fraction, format_exact, shorten
 from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.graphs.tables import import_pandas, ordered_labels
 from ptcc_certify.graphs.weights import Weights
-from ptcc_certify.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd

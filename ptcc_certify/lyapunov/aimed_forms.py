@@ -18,7 +18,7 @@ from itertools import product
 
 import numpy as np
 
-from lmi.common import least_value
+from lmi.common_lyapunov import least_value
 from lmi.errors import LMIError, OutOfTime
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.family_search import prove_certificate

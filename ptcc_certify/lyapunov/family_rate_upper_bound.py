@@ -26,7 +26,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from lmi.common import UncertainMatrix
+from lmi.common_lyapunov import UncertainMatrix
 from lmi.dyadic import round_to_bits
 from lmi.search_time import checkpoint
 from ptcc_certify.graphs.size_limits import EXACT_NODES

@@ -19,8 +19,8 @@ from fractions import Fraction
 
 import numpy as np
 
-from lmi.common import CommonCertificate, best_multipliers, common_lyapunov, least_condition
 from lmi.common_closed_form import closed_form_lyapunov
+from lmi.common_lyapunov import CommonCertificate, best_multipliers, common_lyapunov, least_condition
 from lmi.dyadic import round_to_bits
 from lmi.errors import LMIError, NoCertificate, OutOfTime
 from lmi.search_time import checkpoint, part_of_time, share_of_time

@@ -18,7 +18,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from lmi.common import CommonCertificate, UncertainMatrix, best_multipliers, common_lyapunov, evaluate
+from lmi.common_lyapunov import CommonCertificate, UncertainMatrix, best_multipliers, common_lyapunov, evaluate
 from lmi.definiteness_proofs import prove_generalized_margin
 from lmi.dyadic import round_to_bits
 from lmi.errors import LMIError, OutOfTime

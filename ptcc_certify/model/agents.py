@@ -58,7 +58,7 @@ class Agents:
     exchange : {"states", "virtual"}, optional
         What double integrators hear of each other: relative positions and velocities, or virtual positions, which each
         tracks by its own state alone. The latter goes with late messages, uncertain weights and leaders that move; see
-        :class:`~ptcc_certify.model.vehicles.TrackingProtocol`.
+        :class:`~ptcc_certify.model.virtual_positions.TrackingProtocol`.
 
     Raises
     ------

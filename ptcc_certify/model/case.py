@@ -12,11 +12,11 @@ from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.base import Protocol
+from ptcc_certify.model.constrained_switching import SignalClass
 from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
-from ptcc_certify.model.restricted_signals import SignalClass
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.graphs.structure import Structure
-    from ptcc_certify.model.vehicles import Vehicles
+    from ptcc_certify.model.virtual_positions import Vehicles
 
 #: Most losses in a row.
 MOST_LOSSES = 10**6

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from lmi.exact.decimal_rounding import down, float_down, near, up
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.examples import Example, load_graph
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.initial_state import InitialState

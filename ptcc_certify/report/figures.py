@@ -10,8 +10,8 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from ptcc_certify.bounds.late_messages import LateBounds
-from ptcc_certify.certificate.answer import REFUTED
 from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.exit_code import REFUTED
 from ptcc_certify.errors import ParameterError, SimulationError, gated, labelled
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, EXACT_NODES, INPUT_NODES
 from ptcc_certify.model.base import Protocol

@@ -1,6 +1,6 @@
 """What a notebook shows of a graph, a family, a structure, a certificate, a trajectory, a design: a table, a figure.
 
-What :class:`ptcc_certify.shown.Shown` calls for ``_repr_html_``; elsewhere the plain ``repr`` is shown. Labels are
+What :class:`ptcc_certify.display.Shown` calls for ``_repr_html_``; elsewhere the plain ``repr`` is shown. Labels are
 escaped, figures are inline SVG images with a text in their place for those who do not see them.
 """
 

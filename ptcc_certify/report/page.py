@@ -24,8 +24,8 @@ from markupsafe import Markup
 from lmi.exact.decimal_rounding import counted
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certificate_file import RejectedCertificate
+from ptcc_certify.certificate.constrained_switching.bounds import nearer_for_signal
 from ptcc_certify.certificate.family_comparison import compare
-from ptcc_certify.certificate.restricted_bounds import nearer_for_signal
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.obligations import VerifiedObligation
 from ptcc_certify.errors import Change, Sentence, spell

@@ -16,8 +16,8 @@ import jinja2
 from markupsafe import Markup
 
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.restricted_claims import WindowClaim
-from ptcc_certify.certificate.restricted_states import states_of_signal
+from ptcc_certify.certificate.constrained_switching.claims import WindowClaim
+from ptcc_certify.certificate.constrained_switching.states import states_of_signal
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import STABILITY

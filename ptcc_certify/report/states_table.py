@@ -11,7 +11,7 @@ from markupsafe import Markup
 from lmi.exact.decimal_rounding import counted
 from ptcc_certify.bounds.final_state import extremes
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.restricted_states import states_of_signal
+from ptcc_certify.certificate.constrained_switching.states import states_of_signal
 from ptcc_certify.report import notation as texts
 from ptcc_certify.report.facts.claim import assumptions
 from ptcc_certify.report.facts.signals import agreement_text, rests

@@ -20,8 +20,8 @@ from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes
 from ptcc_certify.graphs.io.signs import find
 from ptcc_certify.graphs.rationals import number_within, parse_exact, shorten, whole_number
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS
+from ptcc_certify.model.constrained_switching import DwellTime
 from ptcc_certify.model.gain import Gain
-from ptcc_certify.model.restricted_signals import DwellTime
 from ptcc_certify.simulation.members import MIDDLE, Choice, Members
 from ptcc_certify.theorems.family_behaviour import decide
 

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ptcc_certify.display import Shown, rendered
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.equality import ByValue
 from ptcc_certify.graphs.rationals import number_within, shorten
 from ptcc_certify.graphs.tables import import_pandas, position
-from ptcc_certify.shown import Shown, rendered
 from ptcc_certify.simulation.members import Choice, Members
 
 if TYPE_CHECKING:

@@ -12,12 +12,12 @@ from fractions import Fraction
 import numpy as np
 
 from lmi.exact.elementary_enclosures import rounded
-from ptcc_certify.checker.restricted_signals import closed_groups, contraction_below
+from ptcc_certify.checker.constrained_switching import closed_groups, contraction_below
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
+from ptcc_certify.model.constrained_switching import JointWindows
 from ptcc_certify.model.parameters import readable
-from ptcc_certify.model.restricted_signals import JointWindows
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
 from ptcc_certify.theorems.family_rate import ExplicitRate, largest_sum, least_mandatory
 

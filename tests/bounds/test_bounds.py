@@ -15,7 +15,7 @@ from generators import KINDS, all_classes, class_cases, random_graph
 
 from ptcc_certify.bounds.envelope import Envelope
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol

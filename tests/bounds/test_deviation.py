@@ -21,7 +21,7 @@ from lmi.exact.fast import SMALL_ROWS, FastArithmetic
 from ptcc_certify.bounds.deviation_from_final_state import _constants
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker import check, digest
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph

@@ -23,7 +23,7 @@ from ptcc_certify.bounds.input.effort_bounds import InputRequest, bound_effort
 from ptcc_certify.bounds.input.initial_set import ellipsoid, initial_set_within
 from ptcc_certify.bounds.input.worst_initial_state import worst_initial_state
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker import check
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.errors import ParameterError

@@ -14,7 +14,7 @@ from scipy.linalg import expm
 
 from ptcc_certify.bounds.final_state import influence
 from ptcc_certify.bounds.formation import drift_until_deadline, formation_of_biases
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse

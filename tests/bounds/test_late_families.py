@@ -14,7 +14,7 @@ from led_families import led_family
 
 import ptcc_certify as ptcc
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker import check
 from ptcc_certify.checker.reading import digest
 from ptcc_certify.errors import HypothesisError, ParameterError

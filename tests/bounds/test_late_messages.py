@@ -28,7 +28,7 @@ from ptcc_certify.bounds.small_delays import delay_threshold
 from ptcc_certify.bounds.staged_deadlines import levels
 from ptcc_certify.bounds.tracking import bound_tracking, drift_integral
 from ptcc_certify.certificate.certificate import read_certificate
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker.input_formulas import PrescribedGain
 from ptcc_certify.checker.late_drift import drift_above
 from ptcc_certify.checker.late_input import gain_above
@@ -726,7 +726,7 @@ def test_late_messages_and_leaders_that_move_are_saved_and_read() -> None:
 
 
 def test_late_messages_and_leaders_of_which_nothing_is_proved_are_read_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("ptcc_certify.certificate.graph_steps.bound_late", _nothing)
+    monkeypatch.setattr("ptcc_certify.certificate.graph_certification.bound_late", _nothing)
     graph, leaders = SignedDigraph.from_edges([("a", "b", 1)]), MovingLeaders("1/2")
     protocol, messages = NominalProtocol(T=1, rho1=1, rho2=3, kappa=1), LateMessages("0.03")
     made = certify(

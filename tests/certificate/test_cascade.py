@@ -22,7 +22,7 @@ from ptcc_certify.bounds.agent_instants import _checked
 from ptcc_certify.bounds.cascade import Roots, course
 from ptcc_certify.certificate.cascade_part import CascadePart
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker import check
 from ptcc_certify.checker.agent_cascade import halvings_of
 from ptcc_certify.checker.agent_model import Cascade

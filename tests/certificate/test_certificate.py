@@ -26,10 +26,10 @@ from selection import thinned
 
 from lmi.exact.decimal_rounding import float_up
 from ptcc_certify.batch import certify_many
-from ptcc_certify.certificate import graph_steps
+from ptcc_certify.certificate import graph_certification
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.certificate.graph_sections import structure_document
-from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.certificate.section_writer import exact_or_ball
 from ptcc_certify.checker import OBLIGATIONS, CheckReport, UnreadableError, check, digest, read
 from ptcc_certify.errors import ParameterError
@@ -445,7 +445,7 @@ def test_the_recheck_sees_what_is_wrong_with_the_limit_of_rates(name: str):
 
 def test_only_what_the_independent_check_accepts_is_certified(monkeypatch: pytest.MonkeyPatch):
     """A search or a proof that is wrong leaves the verdict undecided, and the step is named."""
-    graph, search = load_graph("fig3a"), graph_steps._search_and_prove
+    graph, search = load_graph("fig3a"), graph_certification._search_and_prove
     assert certify(graph, PROTOCOL, asks=Asks(simulation=False, method="paper")).verdict == "certified"
 
     def too_fast(*args: Any) -> Any:
@@ -458,7 +458,7 @@ def test_only_what_the_independent_check_accepts_is_certified(monkeypatch: pytes
         ]
         return V, replace(proof, rate=proof.rate * more, obligations=tuple(steps)), numerical
 
-    monkeypatch.setattr(graph_steps, "_search_and_prove", too_fast)
+    monkeypatch.setattr(graph_certification, "_search_and_prove", too_fast)
     cert = certify(graph, PROTOCOL, asks=Asks(simulation=False, method="paper"))
     assert cert.verdict == cert.to_dict()["verdict"] == "undecided"
     assert not cert.checked.accepted and cert.checked.rejected == "margin of paper"

@@ -7,10 +7,10 @@ import pytest
 from asked import certify_family, family_certificate
 from cpu_time import at_most
 
-from lmi.common import evaluate
+from lmi.common_lyapunov import evaluate
 from lmi.exact.work import WorkError, limited
 from ptcc_certify import NominalProtocol
-from ptcc_certify.certificate import family_steps
+from ptcc_certify.certificate import family_certification
 from ptcc_certify.certificate.family_proof import ComponentProof
 from ptcc_certify.checker import family_function
 from ptcc_certify.checker.matrix_products import WITH_MULTIPLIERS, need_rows_with_multipliers
@@ -115,7 +115,7 @@ def _three_uncertain_edges() -> Family:
 def test_no_function_is_searched_whose_proof_has_more_rows_than_the_check_takes(monkeypatch):
     """3 agents and 3 uncertain edges."""
     monkeypatch.setattr(family_search, "WITH_MULTIPLIERS", 5)
-    monkeypatch.setattr(family_steps, "squares_function", lambda *_: None)
+    monkeypatch.setattr(family_certification, "squares_function", lambda *_: None)
     made = certify_family(_three_uncertain_edges(), PROTOCOL, [1, 2, 3])
     assert made.verdict == "certified" and made.rate is None
     text = " ".join("\n".join(summary_lines(made, "net")).split())
@@ -131,7 +131,7 @@ def test_functions_that_the_check_refuses_are_left_out(monkeypatch):
         raise RejectedError("too many rows")
 
     monkeypatch.setattr(family_function, "need_rows_with_multipliers", refuse)
-    monkeypatch.setattr(family_steps, "LARGEST_ROWS", 5)
+    monkeypatch.setattr(family_certification, "LARGEST_ROWS", 5)
     made = certify_family(_three_uncertain_edges(), PROTOCOL, [1, 2, 3])
     assert made.verdict == "certified" and made.rate is None and made.parts[0].functions == ()
     assert made.notes[-1] == "the independent check does not take all functions that were found: too many rows"

@@ -15,7 +15,7 @@ from ptcc_certify.checker import check, digest
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.model.restricted_signals import ClockShares, DwellTime, JointWindows
+from ptcc_certify.model.constrained_switching import ClockShares, DwellTime, JointWindows
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.input import plot_input
 from ptcc_certify.report.screen import certificate_lines

@@ -10,7 +10,7 @@ import pytest
 import ptcc_certify as ptcc
 from ptcc_certify.bounds.attracting_box import AttractingBox
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.model.restricted_signals import DwellTime
+from ptcc_certify.model.constrained_switching import DwellTime
 
 pytest.importorskip("pandas")
 PROTOCOL = ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)

@@ -16,7 +16,7 @@ from mutations import resealed
 
 from ptcc_certify.certificate.agents_part import AgentsPart
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.model import NominalProtocol

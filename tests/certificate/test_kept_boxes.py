@@ -21,7 +21,7 @@ from selection import thinned
 from ptcc_certify import Family, NominalProtocol, SlidingModeProtocol
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.checker import check
-from ptcc_certify.model.restricted_signals import DwellTime
+from ptcc_certify.model.constrained_switching import DwellTime
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.screen import certificate_lines, summary_lines
 from ptcc_certify.report.statement import report_latex

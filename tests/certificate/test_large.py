@@ -23,9 +23,9 @@ from lmi.errors import NoCertificate
 from lmi.sparse_h_matrix import SparseHMatrix
 from ptcc_certify.bounds import final_state as final_states
 from ptcc_certify.bounds.final_state import final_state
-from ptcc_certify.certificate import graph_steps
+from ptcc_certify.certificate import graph_certification
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker import check
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -46,7 +46,7 @@ CLASSES = dict(all_classes())
 @pytest.fixture
 def small_is_large(monkeypatch: pytest.MonkeyPatch) -> None:
     """Treat every graph as a large one."""
-    monkeypatch.setattr(graph_steps, "EXACT_NODES", 0)
+    monkeypatch.setattr(graph_certification, "EXACT_NODES", 0)
     monkeypatch.setattr(final_states, "EXACT_NODES", 0)
 
 

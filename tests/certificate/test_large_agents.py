@@ -19,9 +19,9 @@ from scipy.linalg import expm
 from selection import thinned
 
 from ptcc_certify.bounds import final_state as final_states
-from ptcc_certify.certificate import graph_steps
+from ptcc_certify.certificate import graph_certification
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.model import NominalProtocol
@@ -81,7 +81,7 @@ def made(graph: SignedDigraph, kind: str, d: int = 1, method: str = "perron") ->
 def as_large(graph: SignedDigraph, kind: str, d: int = 1) -> Certificate:
     """The same in the large form, whatever the size of the graph."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(graph_steps, "EXACT_NODES", 0)
+        patch.setattr(graph_certification, "EXACT_NODES", 0)
         patch.setattr(final_states, "EXACT_NODES", 0)
         return made(graph, kind, d)
 
@@ -175,7 +175,7 @@ def test_numbers_of_any_size_are_enclosed():
     for size in ("1e290", "1e-300"):
         x0, v0 = ([F(size) * int(x) for x in np.random.default_rng(k).integers(-9, 10, N)] for k in (1, 2))
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(graph_steps, "EXACT_NODES", 0)
+            patch.setattr(graph_certification, "EXACT_NODES", 0)
             patch.setattr(final_states, "EXACT_NODES", 0)
             large = certify(
                 graph,
@@ -195,7 +195,7 @@ def test_numbers_of_any_size_are_enclosed():
 def test_agents_that_begin_in_rest_at_their_places_end_there_exactly():
     graph = team(30, 9)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(graph_steps, "EXACT_NODES", 0)
+        patch.setattr(graph_certification, "EXACT_NODES", 0)
         patch.setattr(final_states, "EXACT_NODES", 0)
         h = rows(np.random.default_rng(1), graph.n_nodes, 1)
         found = certify(

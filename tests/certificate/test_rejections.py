@@ -29,8 +29,8 @@ from ptcc_certify import (
 from ptcc_certify.bounds import missed_deadline
 from ptcc_certify.bounds.missed_deadline import Missed
 from ptcc_certify.certificate import document
-from ptcc_certify.certificate.answer import Answer, standing
 from ptcc_certify.certificate.certificate_file import RejectedCertificate
+from ptcc_certify.certificate.exit_code import Answer, standing
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.final_state import WIDEST
 from ptcc_certify.graphs.structure import analyse

@@ -22,8 +22,8 @@ from selection import thinned
 from lmi.exact.decimal_rounding import up
 from ptcc_certify import Family, NominalProtocol, SignedDigraph, certify
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
-from ptcc_certify.certificate.restricted_bounds import deviation_of_signal
-from ptcc_certify.certificate.restricted_claims import LastModeClaim, RateClaim, ShareClaim
+from ptcc_certify.certificate.constrained_switching.bounds import deviation_of_signal
+from ptcc_certify.certificate.constrained_switching.claims import LastModeClaim, RateClaim, ShareClaim
 from ptcc_certify.certificate.verdict import assess
 from ptcc_certify.checker import check, digest
 from ptcc_certify.errors import ParameterError
@@ -31,7 +31,7 @@ from ptcc_certify.lyapunov.clock_shares import search_share_form
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.model.asks import Expectations
-from ptcc_certify.model.restricted_signals import ClockShares, DwellTime, JointWindows
+from ptcc_certify.model.constrained_switching import ClockShares, DwellTime, JointWindows
 from ptcc_certify.report.facts.signals import signal_facts
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.screen import certificate_lines, summary_lines

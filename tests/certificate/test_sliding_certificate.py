@@ -20,7 +20,7 @@ from selection import thinned
 from ptcc_certify.bounds.final_state import final_state
 from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker import SLIDING_BOUND, SLIDING_CLOCK, digest
 from ptcc_certify.checker import check as independent_check
 from ptcc_certify.errors import ParameterError

@@ -27,8 +27,8 @@ from lmi.child_process import apart
 from lmi.errors import OutOfTime
 from lmi.search_time import checkpoint, part_of_time, seconds_left, share_of_time, spend, time_limit
 from ptcc_certify import Agents, NominalProtocol, SignedDigraph, certify, check, simulate
-from ptcc_certify.certificate import graph_steps
-from ptcc_certify.certificate.graph_steps import STEPS
+from ptcc_certify.certificate import graph_certification
+from ptcc_certify.certificate.graph_certification import STEPS
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.family import Family
@@ -121,7 +121,7 @@ def test_final_states_that_run_out_of_time_are_not_called_ill_conditioned(monkey
     def endless(*_: object) -> None:
         raise OutOfTime("the time limit is reached")
 
-    monkeypatch.setattr(graph_steps, "enclose", endless)
+    monkeypatch.setattr(graph_certification, "enclose", endless)
     cert = certify(tree(130), PROTOCOL, [1] * 130, asks=Asks(time_limit=50))
     assert cert.verdict == "undecided" and "final state" in cert.cut_off
     assert cert.assessment.text.endswith("it took its share of 50 s; raise time_limit"), cert.assessment.text
@@ -410,7 +410,7 @@ def test_the_time_limit_ends_an_exact_final_state_and_an_enclosed_one_is_proved(
     def too_long(structure: object) -> None:
         raise OutOfTime("exact")
 
-    monkeypatch.setattr("ptcc_certify.certificate.graph_steps.influence", too_long)
+    monkeypatch.setattr("ptcc_certify.certificate.graph_certification.influence", too_long)
     graph = SignedDigraph.from_edges([("lead", "a", 3), ("other", "a", 1), ("a", "b", -1)])
     cert = certify(graph, PROTOCOL, [2, -2, 1, 5], asks=Asks(time_limit=60, method="perron", simulation=False))
     assert cert.cut_off == ("exact final state",) and cert.final_state is not None and cert.verdict == "certified"

@@ -27,8 +27,8 @@ from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
 from mutations import Json, at, changed, judged_mutants, mutants, nudged, resealed
 from oracle_agents import false_claims_of_agents
 
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.certificate.json_schema import json_schema
-from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import agent_motion, check
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family

@@ -40,11 +40,11 @@ from ptcc_certify import checker
 from ptcc_certify.bounds import enclosed_ends
 from ptcc_certify.bounds import final_state as final_states
 from ptcc_certify.bounds.input.initial_set import box, ellipsoid
-from ptcc_certify.certificate import graph_steps
+from ptcc_certify.certificate import graph_certification
 from ptcc_certify.certificate import section_writer as vectors
 from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.certificate.checking import record
-from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import UnreadableError, check
 from ptcc_certify.checker import graph as checked_graph
 from ptcc_certify.checker.digraph import numbered
@@ -688,7 +688,7 @@ def test_odd_gains_leave_the_rest_certified(gains: dict[str, Any], size: Any):
 def large(name: str, seed: int = 3, slides: bool = False) -> Json:
     """The JSON of a certificate of a small graph that is treated as a large one."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(graph_steps, "EXACT_NODES", 0)
+        patch.setattr(graph_certification, "EXACT_NODES", 0)
         patch.setattr(final_states, "EXACT_NODES", 0)
         return made.__wrapped__(name, seed, slides)
 

@@ -16,7 +16,7 @@ import pytest
 
 from lmi.exact import arithmetic
 from lmi.exact.work import WorkError
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker.array_digraph import ArrayDigraph
 from ptcc_certify.checker.contents import GraphCertificate
 from ptcc_certify.checker.digraph import Digraph

@@ -39,8 +39,8 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.follower_function import follower_functions
 from ptcc_certify.lyapunov.squares_function import SquaresFunction, squares_function
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.model.constrained_switching import ClockShares, DwellTime, JointWindows
 from ptcc_certify.model.reaching_time import certified_reaching_times
-from ptcc_certify.model.restricted_signals import ClockShares, DwellTime, JointWindows
 from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
 
 SEED = int(os.environ.get("PTCC_FUZZ_SEED", "0"))

@@ -14,7 +14,7 @@ from asked import certify_family
 from mutations import Json, changed, resealed
 from row_families import bounds_of
 
-from ptcc_certify.certificate import family_steps, section_writer
+from ptcc_certify.certificate import family_certification, section_writer
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.family_comparison import compare
 from ptcc_certify.certificate.graph_sections import certificate_family, family_sections
@@ -201,7 +201,7 @@ def test_a_sum_of_squares_of_agents_that_agree_is_refused():
 def test_small_families_take_it_where_the_search_finds_nothing_and_else_what_was_found(monkeypatch):
     family = random_core(0, 8, edges=2)
     found = certify_family(family, PROTOCOL)
-    monkeypatch.setattr(family_steps, "search_family", lambda *args, **keywords: FamilySearch())
+    monkeypatch.setattr(family_certification, "search_family", lambda *args, **keywords: FamilySearch())
     cert = certify_family(family, PROTOCOL)
     assert [V.kind for V in cert.parts[0].functions] == ["squares"] and cert.verdict == "certified"
     assert 0 < cert.rate <= found.rate and all(V.kind != "squares" for V in found.parts[0].functions)

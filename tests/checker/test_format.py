@@ -23,10 +23,10 @@ from side_files import with_factors, with_side_files
 from ptcc_certify import checker
 from ptcc_certify.bounds import enclosed_ends
 from ptcc_certify.bounds import final_state as final_states
-from ptcc_certify.certificate import graph_steps
+from ptcc_certify.certificate import graph_certification
 from ptcc_certify.certificate import section_writer as vectors
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.certificate.json_schema import json_schema
-from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import MANY_COMPONENTS, OBLIGATIONS, check
 from ptcc_certify.checker.contents import BRINGS
 from ptcc_certify.checker.reading import RejectedError, exact
@@ -182,7 +182,7 @@ def test_edges_in_side_files_are_valid(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_side_vectors_and_factors_are_valid(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(graph_steps, "EXACT_NODES", 0)
+    monkeypatch.setattr(graph_certification, "EXACT_NODES", 0)
     monkeypatch.setattr(final_states, "EXACT_NODES", 0)
     data, _ = with_side_files(with_factors(made.__wrapped__("3.1 mixed", True, "best")))
     VALIDATOR.validate(data)

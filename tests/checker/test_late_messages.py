@@ -20,8 +20,8 @@ from selection import thinned
 from side_files import Side
 
 from lmi.exact.work import WorkError, limited
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.certificate.json_schema import json_schema
-from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check, graph
 from ptcc_certify.checker.array_digraph import ArrayDigraph
 from ptcc_certify.checker.array_steps import ArraySteps

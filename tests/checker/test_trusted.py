@@ -19,7 +19,7 @@ from paper_examples import paper_examples
 from selection import thinned
 
 import ptcc_certify
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.model import NominalProtocol

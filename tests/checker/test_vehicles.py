@@ -17,8 +17,8 @@ from mutations import Json, at, changed, judged_mutants, mutants, resealed
 from oracle import number
 
 from ptcc_certify import read_certificate
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.certificate.json_schema import json_schema
-from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.errors import HypothesisError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -30,10 +30,10 @@ from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
-from ptcc_certify.model.vehicles import TrackingProtocol
+from ptcc_certify.model.virtual_positions import TrackingProtocol
 from ptcc_certify.simulation.late_messages import simulate_late
 from ptcc_certify.simulation.run import simulate
-from ptcc_certify.simulation.vehicles import follow, simulate_vehicles
+from ptcc_certify.simulation.virtual_positions import follow, simulate_vehicles
 
 F = Fraction
 VIRTUAL = Agents(order=2, exchange="virtual")

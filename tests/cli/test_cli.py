@@ -183,13 +183,13 @@ def test_an_error_of_the_program_is_not_taken_for_a_violated_bound(monkeypatch: 
     def fail(*_: object, **__: object) -> None:
         raise RuntimeError("a bug")
 
-    monkeypatch.setattr("ptcc_certify.certificate.procedure.certify_case", fail)
+    monkeypatch.setattr("ptcc_certify.certificate.certification.certify_case", fail)
     run = ptcc("certify", "fig1b")
     assert run.code == 70
     assert "RuntimeError" in run.err and "report" in run.err and run.out == ""
     for error, code in ((MemoryError(), 2), (OverflowError(), 2), (KeyboardInterrupt(), 130)):
         monkeypatch.setattr(
-            "ptcc_certify.certificate.procedure.certify_case",
+            "ptcc_certify.certificate.certification.certify_case",
             lambda *_, error=error, **__: (_ for _ in ()).throw(error),
         )
         run = ptcc("certify", "fig1b")

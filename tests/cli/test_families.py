@@ -11,7 +11,7 @@ from bad_inputs import ptcc
 from selection import thinned
 
 from ptcc_certify import NominalProtocol, certify
-from ptcc_certify.certificate.answer import CERTIFIED
+from ptcc_certify.certificate.exit_code import CERTIFIED
 from ptcc_certify.graphs.io import read_family
 from ptcc_certify.report.facts.claim import _cut
 from ptcc_certify.report.text_layout import wrap_text
@@ -620,12 +620,12 @@ def test_a_misprint_in_a_mode_names_the_node_that_is_near():
 
 def test_what_the_time_limit_cut_off_of_a_family_is_a_sentence(monkeypatch: pytest.MonkeyPatch):
     from lmi.errors import OutOfTime
-    from ptcc_certify.certificate import family_steps
+    from ptcc_certify.certificate import family_certification
 
     def late(*_: object) -> None:
         raise OutOfTime("late")
 
-    monkeypatch.setattr(family_steps, "prove_family_rate_bound", late)
+    monkeypatch.setattr(family_certification, "prove_family_rate_bound", late)
     assert "note       upper bound on the decay rate: cut off by the time limit" in ptcc("certify", *BOTH, "-v").out
 
 

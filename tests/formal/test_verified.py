@@ -21,7 +21,7 @@ from paper_examples import paper_examples
 from selection import every, thinned
 from verified import AT_REST, SKIPPED, UNREAD, compare, named, program, said
 
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker import check
 from ptcc_certify.checker.input_formulas import InitialSet
 from ptcc_certify.checker.obligations import OBLIGATIONS

@@ -17,7 +17,7 @@ from mutations import Json, at, changed, mutants, nudged, resealed
 from selection import every
 from verified import compare, named, program, said
 
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.model import NominalProtocol

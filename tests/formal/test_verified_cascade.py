@@ -18,7 +18,7 @@ from mutations import Json, at, changed, mutants, nudged, resealed, without_inst
 from verified import compare, named, program, said
 
 from ptcc_certify.bounds import final_state as final_states
-from ptcc_certify.certificate import graph_steps
+from ptcc_certify.certificate import graph_certification
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
@@ -221,7 +221,7 @@ def own_mutants(data: Json, every: int, start: int, nudges: int) -> list[tuple[t
 def test_a_cascade_on_a_large_form_is_told_in_one_line(tmp_path: Path) -> None:
     program()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(graph_steps, "EXACT_NODES", 0)
+        patch.setattr(graph_certification, "EXACT_NODES", 0)
         patch.setattr(final_states, "EXACT_NODES", 0)
         data = document(SignedDigraph.from_edges(GRAPHS["singles"]), STRONG, {"method": "perron"}, 1)
     assert check(data).accepted

@@ -27,7 +27,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.follower_function import follower_functions
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.model.restricted_signals import ClockShares, JointWindows
+from ptcc_certify.model.constrained_switching import ClockShares, JointWindows
 from ptcc_certify.theorems.family_behaviour import decide
 
 Json = dict[str, Any]

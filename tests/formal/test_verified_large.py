@@ -20,8 +20,8 @@ from verified import UNREAD, named, program, said, unchecked
 
 from ptcc_certify import SignedDigraph
 from ptcc_certify.bounds import final_state as final_states
-from ptcc_certify.certificate import graph_steps
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate import graph_certification
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker import check
 from ptcc_certify.lyapunov import dominance
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
@@ -35,7 +35,7 @@ CLASSES = dict(all_classes())
 @pytest.fixture(autouse=True)
 def small_is_large(monkeypatch: pytest.MonkeyPatch) -> None:
     """Treat every graph as a large one."""
-    monkeypatch.setattr(graph_steps, "EXACT_NODES", 0)
+    monkeypatch.setattr(graph_certification, "EXACT_NODES", 0)
     monkeypatch.setattr(final_states, "EXACT_NODES", 0)
 
 

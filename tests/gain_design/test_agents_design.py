@@ -13,7 +13,7 @@ from generators import all_classes, random_graph
 from scipy.optimize import linprog
 
 from ptcc_certify.bounds.shortest_time import shortest_time
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker import check
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.gain_design import agents_search

@@ -9,7 +9,7 @@ import pytest
 
 import lmi
 from lmi.child_process import apart
-from lmi.common import UncertainMatrix, best_multipliers, common_lyapunov, evaluate, least_condition
+from lmi.common_lyapunov import UncertainMatrix, best_multipliers, common_lyapunov, evaluate, least_condition
 
 
 def uncertain(rng, n=3, q=3):

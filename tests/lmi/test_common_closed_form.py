@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import lmi
-from lmi.common import UncertainMatrix, best_multipliers, common_lyapunov, evaluate
 from lmi.common_closed_form import closed_form_lyapunov, tuned_multipliers
+from lmi.common_lyapunov import UncertainMatrix, best_multipliers, common_lyapunov, evaluate
 
 
 def uncertain(seed: int, n: int = 6, q: int = 5) -> UncertainMatrix:

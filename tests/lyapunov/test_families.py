@@ -14,7 +14,7 @@ from scipy.linalg import expm
 from selection import thinned
 
 import lmi
-import lmi.common
+import lmi.common_lyapunov
 from ptcc_certify import NominalProtocol
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -209,7 +209,7 @@ def test_a_time_limit_leaves_what_was_proved_before():
 
 def test_what_was_climbed_to_before_a_time_limit_is_proved():
     quotient = Quotient(random_family(np.random.default_rng(5), "consensus", 5, 2, TENTH))
-    real, calls = lmi.common._Search._step, []
+    real, calls = lmi.common_lyapunov._Search._step, []
 
     def slow_after_the_first(*step):
         calls.append(1)
@@ -218,15 +218,15 @@ def test_what_was_climbed_to_before_a_time_limit_is_proved():
         return real(*step)
 
     with pytest.MonkeyPatch.context() as patch, lmi.time_limit(300):
-        patch.setattr(lmi.common._Search, "_step", slow_after_the_first)
-        patch.setattr(lmi.common._Search, "nominal_start", lambda self: None)
+        patch.setattr(lmi.common_lyapunov._Search, "_step", slow_after_the_first)
+        patch.setattr(lmi.common_lyapunov._Search, "nominal_start", lambda self: None)
         search = search_family(quotient, ["full"])
     assert search.functions and len(calls) == 2
 
 
 def test_where_no_program_can_be_afforded_there_is_a_useful_rate_all_the_same(monkeypatch: pytest.MonkeyPatch):
     quotient = Quotient(random_family(np.random.default_rng(5), "consensus", 24, 1, TENTH))
-    monkeypatch.setattr(lmi.common, "program_seconds", lambda *_: math.inf)
+    monkeypatch.setattr(lmi.common_lyapunov, "program_seconds", lambda *_: math.inf)
     with lmi.time_limit(60, work=True):
         search = search_family(quotient)
     assert {"class diagonal", "class full"} <= set(search.cut_off)

@@ -13,7 +13,7 @@ import pytest
 from selection import thinned
 
 import ptcc_certify as ptcc
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.examples import load_graph
 from ptcc_certify.gain_design.search import design
 from ptcc_certify.graphs.digraph import SignedDigraph

@@ -20,7 +20,7 @@ from ptcc_certify.errors import unlabelled
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.model.asks import Expectations
-from ptcc_certify.model.restricted_signals import DwellTime
+from ptcc_certify.model.constrained_switching import DwellTime
 from ptcc_certify.report.facts.claim import groups_text
 from ptcc_certify.report.facts.of_structure import decision_facts
 from ptcc_certify.report.page import report_html
@@ -326,7 +326,7 @@ def test_more_functions_than_the_check_takes_are_left_out_and_nothing_rests_on_t
     assert refused.verdict == "undecided" and "more than 2 Lyapunov functions" in (refused.checked.reason or "")
     assert "the independent check rejects" in told
     assert not any(f"\n{entry}" in told for entry in ("claim", "rate", "x(T)", "error", "input"))
-    monkeypatch.setattr("ptcc_certify.certificate.family_steps.MANY_FUNCTIONS", 2)
+    monkeypatch.setattr("ptcc_certify.certificate.family_certification.MANY_FUNCTIONS", 2)
     fewer = certify_family(Family.from_intervals(pairs), PROTOCOL, range(6), time_limit=60)
     assert fewer.verdict == "certified" and not any(part.functions for part in fewer.parts)
     assert any("more than 2 Lyapunov functions" in note for note in fewer.notes)

@@ -18,7 +18,7 @@ from selection import thinned
 import ptcc_certify as ptcc
 from ptcc_certify.bounds.final_state import extremes
 from ptcc_certify.certificate.certificate import read_certificate
-from ptcc_certify.certificate.graph_steps import STEPS
+from ptcc_certify.certificate.graph_certification import STEPS
 from ptcc_certify.certificate.verdict import NO_SEARCHES
 from ptcc_certify.errors import ExitCode
 from ptcc_certify.examples import load_graph

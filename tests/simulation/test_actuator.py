@@ -13,7 +13,7 @@ from scipy.integrate import quad, solve_ivp
 from scipy.linalg import expm
 from selection import thinned
 
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.certification import certify
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph

@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 from lmi.exact.decimal_rounding import up
-from ptcc_certify.bounds.section_numbers import fractions, numbers
+from ptcc_certify.bounds.float_conversion import fractions, numbers
 from ptcc_certify.checker import INPUT_NODES
 from ptcc_certify.checker.input import (
     Box,

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lmi.exact.decimal_rounding import counted, down, near
+from ptcc_certify.certificate.constrained_switching.claims import LastModeClaim
 from ptcc_certify.certificate.facts import Fact, Facts
-from ptcc_certify.certificate.restricted_claims import LastModeClaim
 from ptcc_certify.errors import labelled
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.structure import BIPARTITE_CONTAINMENT, STABILITY, Structure

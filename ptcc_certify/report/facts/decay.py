@@ -260,7 +260,10 @@ def function_facts(certificate: Certificate) -> Facts:
 
 def family_error_facts(certificate: Certificate) -> Facts:
     """Tell how near the agents are to their final states by when, for every signal and those that were asked for."""
-    from ptcc_certify.certificate.restricted_bounds import deviation_of_signal, nearer_for_signal  # slow to load
+    from ptcc_certify.certificate.constrained_switching.bounds import (  # slow to load
+        deviation_of_signal,
+        nearer_for_signal,
+    )
 
     if certificate.initial_state is None or certificate.refused:
         return

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from lmi.exact.decimal_rounding import near
-from ptcc_certify.certificate.answer import rejects
+from ptcc_certify.certificate.exit_code import rejects
 from ptcc_certify.certificate.facts import Fact, Facts
 from ptcc_certify.report.facts.agents import agents_facts
 from ptcc_certify.report.facts.claim import assumptions, claim_facts, family_claims

@@ -6,19 +6,19 @@ import math
 from typing import TYPE_CHECKING
 
 from lmi.exact.decimal_rounding import down, near, up
-from ptcc_certify.certificate.facts import Fact, Facts
-from ptcc_certify.certificate.restricted_claims import (
+from ptcc_certify.certificate.constrained_switching.claims import (
     FinalValueClaim,
     LastModeClaim,
     RateClaim,
     ShareClaim,
     WindowClaim,
 )
-from ptcc_certify.certificate.restricted_reasons import TOO_SMALL, reasons_for_none
+from ptcc_certify.certificate.constrained_switching.reasons import TOO_SMALL, reasons_for_none
+from ptcc_certify.certificate.facts import Fact, Facts
 from ptcc_certify.errors import labelled
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, CONSENSUS, CONTAINMENT
-from ptcc_certify.model.restricted_signals import ClockShares, DwellTime, JointWindows, SignalClass
+from ptcc_certify.model.constrained_switching import ClockShares, DwellTime, JointWindows, SignalClass
 from ptcc_certify.report.text_layout import agent_text, printable
 from ptcc_certify.theorems.counterexample_text import mode_name
 from ptcc_certify.theorems.family_behaviour import DEPENDS
@@ -44,7 +44,7 @@ def signal_facts(certificate: Certificate) -> Facts:
     >>> print(next(signal_facts(cert)).text)
     if mode and weights never change: rate 1.58578, as for every signal; nothing more is proved
 
-    Where agents end then is told by :mod:`ptcc_certify.certificate.restricted_states`.
+    Where agents end then is told by :mod:`ptcc_certify.certificate.constrained_switching.states`.
     """
     if certificate.signal == "any":
         return

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from lmi.exact.decimal_rounding import counted, up
 from ptcc_certify.bounds.final_state import extremes
+from ptcc_certify.certificate.constrained_switching.states import constant_states, last_states, states_of_signal
 from ptcc_certify.certificate.facts import Fact, Facts
-from ptcc_certify.certificate.restricted_states import constant_states, last_states, states_of_signal
 from ptcc_certify.errors import labelled
 from ptcc_certify.report.facts.claim import range_text, told_ranges
 from ptcc_certify.report.facts.intervals import interval_text, intervals_text

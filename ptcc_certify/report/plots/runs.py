@@ -10,7 +10,7 @@ from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_comparison import worst_case_signals
 from ptcc_certify.errors import Change, ParameterError
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.model.restricted_signals import ClockShares, DwellTime, JointWindows
+from ptcc_certify.model.constrained_switching import ClockShares, DwellTime, JointWindows
 from ptcc_certify.report.plots.style import RUN
 from ptcc_certify.report.plots.subject import certifies_family, trajectory_of
 from ptcc_certify.simulation.run import simulate

@@ -35,10 +35,10 @@ from ptcc_certify.certificate.agents_part import AgentsPart, prove_agents, with_
 from ptcc_certify.certificate.agents_request import (
     Chains,
 )
-from ptcc_certify.certificate.answer import rejects
 from ptcc_certify.certificate.cascade_part import prove_cascade
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.evidence import Observations
+from ptcc_certify.certificate.exit_code import rejects
 from ptcc_certify.certificate.final_state_sections import stated_ends
 from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.certificate.proof import OfQuestion

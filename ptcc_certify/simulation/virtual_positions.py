@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from ptcc_certify.model.base import Protocol
     from ptcc_certify.model.late_messages import LateMessages
     from ptcc_certify.model.moving_leaders import MovingLeaders
-    from ptcc_certify.model.vehicles import TrackingProtocol
+    from ptcc_certify.model.virtual_positions import TrackingProtocol
     from ptcc_certify.simulation.trajectory import Trajectory
 
 #: Instants of a run that vehicles follow.
@@ -101,7 +101,7 @@ def simulate_vehicles(
     Examples
     --------
     >>> from ptcc_certify.model.gain import Gain
-    >>> from ptcc_certify.model.vehicles import TrackingProtocol
+    >>> from ptcc_certify.model.virtual_positions import TrackingProtocol
     >>> protocol = TrackingProtocol(Gain(T=1, rho1=1, rho2=2, kappa=2), Fraction(4), Fraction(4))
     >>> run = simulate_vehicles(SignedDigraph.from_edges([(1, 2, 1)]), protocol, [1, 0], [0, 5])
     >>> run.positions[:, 0, -1].round(4)

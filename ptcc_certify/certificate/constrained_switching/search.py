@@ -15,8 +15,7 @@ from lmi.search_time import share_of_time
 from ptcc_certify.bounds.attracting_box import have_common_denominator
 from ptcc_certify.bounds.family_final_state import ValueEnds, value_ends
 from ptcc_certify.bounds.kept_means import mean_of_shares
-from ptcc_certify.certificate.family_proof import ComponentProof
-from ptcc_certify.certificate.restricted_claims import (
+from ptcc_certify.certificate.constrained_switching.claims import (
     Claim,
     FinalValueClaim,
     LastModeClaim,
@@ -24,7 +23,8 @@ from ptcc_certify.certificate.restricted_claims import (
     ShareClaim,
     WindowClaim,
 )
-from ptcc_certify.checker.restricted_signals import MANY_CLAIMS, agreed_bounds, reachable_bounds
+from ptcc_certify.certificate.family_proof import ComponentProof
+from ptcc_certify.checker.constrained_switching import MANY_CLAIMS, agreed_bounds, reachable_bounds
 from ptcc_certify.errors import Change, HypothesisError, ParameterError
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.rationals import writable
@@ -35,7 +35,7 @@ from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.mode_forms import ModeForms, search_mode_forms, search_single_forms, within_reach
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.model import Protocol
-from ptcc_certify.model.restricted_signals import ClockShares, DwellTime, JointWindows, SignalClass
+from ptcc_certify.model.constrained_switching import ClockShares, DwellTime, JointWindows, SignalClass
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 from ptcc_certify.theorems.joint_windows import joint_behaviour, window_rate
 from ptcc_certify.theorems.last_mode import last_mode_behaviours

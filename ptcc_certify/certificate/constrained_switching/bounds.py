@@ -15,14 +15,14 @@ import numpy as np
 
 from lmi.exact.numbers import integers
 from ptcc_certify.bounds.family_deviation import deviation_on_clock
+from ptcc_certify.certificate.constrained_switching.claims import RateClaim
 from ptcc_certify.certificate.family_proof import BoundFunction, ComponentProof, FamilyProof
-from ptcc_certify.certificate.restricted_claims import RateClaim
 from ptcc_certify.checker.family_function import Scaled
 from ptcc_certify.checker.family_limits import WeightedMean
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.lyapunov.mode_forms import mode_functions
 from ptcc_certify.lyapunov.quotient import Quotient
-from ptcc_certify.model.restricted_signals import DwellTime
+from ptcc_certify.model.constrained_switching import DwellTime
 
 #: Longest product of the factors at all switches, in bits.
 _BITS = 2000
@@ -79,7 +79,7 @@ def deviation_of_signal(proof: FamilyProof, remaining: Sequence[float] | np.ndar
 
     Examples
     --------
-    >>> from ptcc_certify.model.restricted_signals import DwellTime
+    >>> from ptcc_certify.model.constrained_switching import DwellTime
     >>> one, other = [("a", "b", 1), ("b", "c", -4)], [("b", "a", 1), ("a", "c", -1)]
     >>> modes = {"one": SignedDigraph.from_edges(one), "other": SignedDigraph.from_edges(other)}
     >>> cert = certify(modes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2, 3], signal=DwellTime(1, clock="t"))

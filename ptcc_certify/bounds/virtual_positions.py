@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_up, up
-from ptcc_certify.bounds.section_numbers import floats_up
+from ptcc_certify.bounds.float_conversion import floats_up
 from ptcc_certify.bounds.tracking import drift_integral
 from ptcc_certify.checker.input_formulas import PrescribedGain
 from ptcc_certify.checker.late_messages import Messages, Moving
 from ptcc_certify.checker.side_files import Numbers
-from ptcc_certify.checker.vehicles import Decay, VehiclesSection, coefficients
+from ptcc_certify.checker.virtual_positions import Decay, VehiclesSection, coefficients
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.lyapunov.follower_rows import FollowerRows
@@ -127,7 +127,7 @@ def bound_vehicles(late: Any, rows: FollowerRows) -> Any:
     Examples
     --------
     >>> from ptcc_certify.bounds.late_messages import bound_late
-    >>> from ptcc_certify.model.vehicles import Vehicles
+    >>> from ptcc_certify.model.virtual_positions import Vehicles
     >>> structure = analyse(SignedDigraph.from_edges([(1, 2, 1)]))
     >>> messages = LateMessages(gain_cap=9, vehicles=Vehicles((Fraction(0), Fraction(1))))
     >>> ends = [(Fraction(1), Fraction(0))] * 2

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from lmi.exact.decimal_rounding import down
-from ptcc_certify.certificate.restricted_claims import ShareClaim
-from ptcc_certify.checker.restricted_signals import MANY_CLAIMS
-from ptcc_certify.model.restricted_signals import ClockShares, JointWindows
+from ptcc_certify.certificate.constrained_switching.claims import ShareClaim
+from ptcc_certify.checker.constrained_switching import MANY_CLAIMS
+from ptcc_certify.model.constrained_switching import ClockShares, JointWindows
 from ptcc_certify.theorems.family_behaviour import DEPENDS
 from ptcc_certify.theorems.joint_windows import joint_behaviour
 

@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS
-from ptcc_certify.model.restricted_signals import ClockShares, JointWindows, SignalClass
+from ptcc_certify.model.constrained_switching import ClockShares, JointWindows, SignalClass
 from ptcc_certify.theorems.family_rate import ExplicitRate
 
 if TYPE_CHECKING:  # classes of signals are told without the solvers

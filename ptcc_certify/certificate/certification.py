@@ -18,8 +18,14 @@ from ptcc_certify.certificate.agents_request import (
     with_vehicles,
 )
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.family_steps import certify_family, refuse_signals
-from ptcc_certify.certificate.graph_steps import STEPS, GraphSteps, with_agents, with_small_delays, with_word_of_check
+from ptcc_certify.certificate.family_certification import certify_family, refuse_signals
+from ptcc_certify.certificate.graph_certification import (
+    STEPS,
+    GraphSteps,
+    with_agents,
+    with_small_delays,
+    with_word_of_check,
+)
 from ptcc_certify.certificate.request import (
     Question,
     listener,
@@ -43,6 +49,7 @@ from ptcc_certify.model import Protocol
 from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.case import Case
+from ptcc_certify.model.constrained_switching import SignalClass
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.refusals import (
@@ -52,7 +59,6 @@ from ptcc_certify.model.refusals import (
     refuse_exchanged,
     refuse_of_families,
 )
-from ptcc_certify.model.restricted_signals import SignalClass
 
 
 @gated  # type: ignore[misc]  # it takes the parts below, no others
@@ -86,7 +92,7 @@ def certify(
         Of every weight, as a share of it, such as "10%": then the graph is a family.
     signal : {"any", "constant"}, DwellTime, JointWindows or ClockShares
         Of a family: restricted signals of which more is claimed, beside what holds for every signal; the three classes
-        are in :mod:`ptcc_certify.model.restricted_signals`.
+        are in :mod:`ptcc_certify.model.constrained_switching`.
     agents : Agents, optional
         Agents of order n, or in a formation; without them ``x' = u``. Then ``x0`` may be N rows of coordinates.
     messages : LateMessages, optional

@@ -23,17 +23,17 @@ from ptcc_certify.bounds.kept_means import with_means
 from ptcc_certify.bounds.late_messages import bound_late
 from ptcc_certify.bounds.tracking import bound_tracking
 from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.constrained_switching.claims import RateClaim
+from ptcc_certify.certificate.constrained_switching.search import STEP, claims_for, require_nominal
 from ptcc_certify.certificate.evidence import Observations
 from ptcc_certify.certificate.family_proof import ComponentProof, FamilyProof
 from ptcc_certify.certificate.functions import ProvedFunction
 from ptcc_certify.certificate.request import Question
-from ptcc_certify.certificate.restricted_claims import RateClaim
-from ptcc_certify.certificate.restricted_search import STEP, claims_for, require_nominal
+from ptcc_certify.checker.constrained_switching import reachable_bounds
 from ptcc_certify.checker.family import MANY_MODES
 from ptcc_certify.checker.family_rows import MANY_FUNCTIONS
 from ptcc_certify.checker.matrix_products import LARGEST_ROWS
 from ptcc_certify.checker.reading import Interval
-from ptcc_certify.checker.restricted_signals import reachable_bounds
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float
@@ -48,8 +48,8 @@ from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.squares_function import SquaresFunction, squares_function
 from ptcc_certify.model import Protocol
 from ptcc_certify.model.case import Case
+from ptcc_certify.model.constrained_switching import ClockShares, JointWindows, read_signal
 from ptcc_certify.model.reaching_time import ReachingTime
-from ptcc_certify.model.restricted_signals import ClockShares, JointWindows, read_signal
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, decide
 from ptcc_certify.theorems.joint_windows import refuse_impossible_windows
 
