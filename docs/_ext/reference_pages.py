@@ -21,7 +21,7 @@ ROOMS = {
     ),
     "certificate": (
         "Certificates",
-        "certificate.certificate certificate.answer certificate.facts",
+        "certificate.certificate certificate.exit_code certificate.facts",
     ),
     "checker": ("The independent check", "certificate.checking checker"),
     "bounds": (
