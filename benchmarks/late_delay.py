@@ -23,10 +23,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from late_certificates import grouped_graph, led_graph
 
-from ptcc_certify.bounds.delay_lmi import DelayLMIBounds
-from ptcc_certify.bounds.final_state import final_state
-from ptcc_certify.bounds.late_messages import LateBounds, bound_late
-from ptcc_certify.bounds.small_delays import SmallDelayBounds, delay_threshold
+from ptcc_certify.bounds.delay.delay_lmi import DelayLMIBounds
+from ptcc_certify.bounds.delay.late_messages import LateBounds, bound_late
+from ptcc_certify.bounds.delay.small_delays import SmallDelayBounds, delay_threshold
+from ptcc_certify.bounds.final_state.of_graph import final_state
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.model import NominalProtocol

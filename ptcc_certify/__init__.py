@@ -88,9 +88,9 @@ _EXPORTS = {
     "read_certificate": "certificate.certificate",
     "check": "certificate.checking",
     # Bounds and design
-    "final_state": "bounds.final_state",
-    "influence": "bounds.final_state",
-    "formation_of_biases": "bounds.formation",
+    "final_state": "bounds.final_state.of_graph",
+    "influence": "bounds.final_state.of_graph",
+    "formation_of_biases": "bounds.agents.formation",
     "box": "bounds.input.initial_set",
     "ellipsoid": "bounds.input.initial_set",
     "worst_initial_state": "bounds.input.worst_initial_state",

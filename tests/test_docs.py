@@ -50,7 +50,7 @@ IN_ROOMS = {
     "model.disturbance": ("WorstCaseDisturbance",),
     "model.reaching_time": ("ReachingTime", "certified_reaching_times"),
     "simulation.trajectory": ("Sliding",),
-    "bounds.final_state": ("FinalState", "Influence"),
+    "bounds.final_state.of_graph": ("FinalState", "Influence"),
     "bounds.envelope": ("Envelope", "Comparison"),
     "bounds.sliding_envelope": ("SlidingEnvelope",),
     "bounds.input.effort": ("Effort",),

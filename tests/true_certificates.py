@@ -14,7 +14,7 @@ from generators import all_classes, random_graph, smallest
 from mutations import Json
 from side_files import with_factors, with_side_files
 
-from ptcc_certify.bounds import final_state as final_states
+from ptcc_certify.bounds.final_state import of_graph as final_states
 from ptcc_certify.bounds.input.initial_set import box, ellipsoid
 from ptcc_certify.certificate import graph_certification
 from ptcc_certify.certificate.certification import certify

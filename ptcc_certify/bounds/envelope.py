@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_up
-from ptcc_certify.bounds.final_state import Influence, influence
+from ptcc_certify.bounds.final_state.of_graph import Influence, influence
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import as_state
 from ptcc_certify.graphs.rationals import shorten

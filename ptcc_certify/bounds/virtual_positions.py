@@ -126,7 +126,7 @@ def bound_vehicles(late: Any, rows: FollowerRows) -> Any:
 
     Examples
     --------
-    >>> from ptcc_certify.bounds.late_messages import bound_late
+    >>> from ptcc_certify.bounds.delay.late_messages import bound_late
     >>> from ptcc_certify.model.virtual_positions import Vehicles
     >>> structure = analyse(SignedDigraph.from_edges([(1, 2, 1)]))
     >>> messages = LateMessages(gain_cap=9, vehicles=Vehicles((Fraction(0), Fraction(1))))

@@ -14,11 +14,11 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import down, float_up, near, up
 from lmi.exact.elementary_enclosures import sqrt
-from ptcc_certify.bounds.agent_motion import Interval
-from ptcc_certify.bounds.agents import States, first_inputs
-from ptcc_certify.bounds.agents_comparison import AgentsComparison
-from ptcc_certify.bounds.enclosed_ends import agents_ends, weighted_sum
-from ptcc_certify.bounds.final_state import Influence, NotEnclosedError
+from ptcc_certify.bounds.agents.comparison import AgentsComparison
+from ptcc_certify.bounds.agents.each_agent import States, first_inputs
+from ptcc_certify.bounds.agents.motion import Interval
+from ptcc_certify.bounds.final_state.enclosed_ends import agents_ends, weighted_sum
+from ptcc_certify.bounds.final_state.of_graph import Influence, NotEnclosedError
 from ptcc_certify.bounds.float_conversion import fractions
 from ptcc_certify.certificate.exit_code import MET, OPEN, REFUTED, Answer
 from ptcc_certify.checker.agent_bounds import AgentsInput, UsedSection

@@ -12,9 +12,8 @@ from functools import cached_property
 import numpy as np
 
 from lmi.exact.decimal_rounding import counted, down, float_down, float_up, near, up
-from ptcc_certify.bounds.agent_instants import Values, instant_values
-from ptcc_certify.bounds.agent_motion import Interval, common_motion
-from ptcc_certify.bounds.agents import (
+from ptcc_certify.bounds.agents.comparison import AgentsComparison, compare_agents
+from ptcc_certify.bounds.agents.each_agent import (
     States,
     error_constants,
     initial_value,
@@ -22,9 +21,10 @@ from ptcc_certify.bounds.agents import (
     root_product,
     scaled_states,
 )
-from ptcc_certify.bounds.agents_comparison import AgentsComparison, compare_agents
-from ptcc_certify.bounds.enclosed_ends import agents_ends
-from ptcc_certify.bounds.final_state import Influence
+from ptcc_certify.bounds.agents.instants import Values, instant_values
+from ptcc_certify.bounds.agents.motion import Interval, common_motion
+from ptcc_certify.bounds.final_state.enclosed_ends import agents_ends
+from ptcc_certify.bounds.final_state.of_graph import Influence
 from ptcc_certify.bounds.float_conversion import numbers
 from ptcc_certify.bounds.input.tightest_bound import round_up
 from ptcc_certify.certificate.agents_answer import (

@@ -8,8 +8,8 @@ from fractions import Fraction
 from typing import Any, NamedTuple
 
 from lmi.exact.decimal_rounding import up
-from ptcc_certify.bounds.agents import States
-from ptcc_certify.bounds.formation import GroupDrift, drift_until_deadline, formation_of_biases
+from ptcc_certify.bounds.agents.each_agent import States
+from ptcc_certify.bounds.agents.formation import GroupDrift, drift_until_deadline, formation_of_biases
 from ptcc_certify.checker.input_formulas import InitialSet, root_above
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph

@@ -11,11 +11,7 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, float_down, float_up, near, up
-from ptcc_certify.bounds.agent_instants import Values, instant_roots
-from ptcc_certify.bounds.agent_motion import LARGEST_DECAY, Interval, common_motion
-from ptcc_certify.bounds.agents import States, error_constants, root_product
-from ptcc_certify.bounds.agents_comparison import AgentsComparison, compare_with_bounds
-from ptcc_certify.bounds.cascade import (
+from ptcc_certify.bounds.agents.cascade import (
     Roots,
     course,
     drive_integral,
@@ -24,7 +20,11 @@ from ptcc_certify.bounds.cascade import (
     input_is_bounded,
     root_of,
 )
-from ptcc_certify.bounds.final_state import Influence
+from ptcc_certify.bounds.agents.comparison import AgentsComparison, compare_with_bounds
+from ptcc_certify.bounds.agents.each_agent import States, error_constants, root_product
+from ptcc_certify.bounds.agents.instants import Values, instant_roots
+from ptcc_certify.bounds.agents.motion import LARGEST_DECAY, Interval, common_motion
+from ptcc_certify.bounds.final_state.of_graph import Influence
 from ptcc_certify.bounds.float_conversion import numbers
 from ptcc_certify.certificate.agents_answer import (
     AgentsAnswer,

@@ -8,8 +8,8 @@ from fractions import Fraction
 from typing import Any
 
 from lmi.exact.elementary_enclosures import rounded
+from ptcc_certify.bounds.delay.late_messages import late_obligations, messages_section
 from ptcc_certify.bounds.input.effort import EnergyIntegral, Peak, effort_section, peak_witness
-from ptcc_certify.bounds.late_messages import late_obligations, messages_section
 from ptcc_certify.bounds.tracking import leaders_section, tracking_obligations
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.agents_part import AgentsPart, matrix_section, phases_section

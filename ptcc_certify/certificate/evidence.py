@@ -9,9 +9,9 @@ from typing import Any, Self
 
 import numpy as np
 
-from ptcc_certify.bounds.agents_comparison import AgentsComparison
+from ptcc_certify.bounds.agents.comparison import AgentsComparison
 from ptcc_certify.bounds.envelope import Comparison, remaining_part
-from ptcc_certify.bounds.final_state import final_state
+from ptcc_certify.bounds.final_state.of_graph import final_state
 from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.certificate.proof import OfQuestion

@@ -17,10 +17,10 @@ from lmi import search_time as deadline
 from lmi.errors import NoCertificate
 from lmi.exact.decimal_rounding import counted
 from lmi.search_time import share_of_time
-from ptcc_certify.bounds.attracting_box import AttractingBox, box_of_family
+from ptcc_certify.bounds.delay.late_messages import bound_late
 from ptcc_certify.bounds.envelope import FRACTIONS
-from ptcc_certify.bounds.kept_means import with_means
-from ptcc_certify.bounds.late_messages import bound_late
+from ptcc_certify.bounds.final_state.attracting_box import AttractingBox, box_of_family
+from ptcc_certify.bounds.final_state.kept_means import with_means
 from ptcc_certify.bounds.tracking import bound_tracking
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.constrained_switching.claims import RateClaim

@@ -14,19 +14,19 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.numbers import integers
-from ptcc_certify.bounds.attracting_box import AttractingBox
-from ptcc_certify.bounds.envelope import Instants, remaining_part
-from ptcc_certify.bounds.family_deviation import (
+from ptcc_certify.bounds.deviation.heard import HeardRows
+from ptcc_certify.bounds.deviation.of_family import (
     RestStates,
     deviation_while_driven,
     input_while_driven,
     sliding_sizes,
 )
-from ptcc_certify.bounds.final_ends import FinalEnds
-from ptcc_certify.bounds.heard_deviation import HeardRows
-from ptcc_certify.bounds.kept_means import LeadingGroup, leading_groups
+from ptcc_certify.bounds.deviation.undriven_part import FunctionOf, UndrivenPart
+from ptcc_certify.bounds.envelope import Instants, remaining_part
+from ptcc_certify.bounds.final_state.attracting_box import AttractingBox
+from ptcc_certify.bounds.final_state.final_ends import FinalEnds
+from ptcc_certify.bounds.final_state.kept_means import LeadingGroup, leading_groups
 from ptcc_certify.bounds.reaching_phase import ReachingPhase
-from ptcc_certify.bounds.undriven_part import FunctionOf, UndrivenPart
 from ptcc_certify.certificate.constrained_switching.claims import (
     Claim,
     FinalValueClaim,

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ptcc_certify.bounds.enclosed_ends import agents_ends, influence_balls
-from ptcc_certify.bounds.final_state import FinalState, Influence, rounding_radius
+from ptcc_certify.bounds.final_state.enclosed_ends import agents_ends, influence_balls
+from ptcc_certify.bounds.final_state.of_graph import FinalState, Influence, rounding_radius
 from ptcc_certify.bounds.float_conversion import numbers
 from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.certificate.section_writer import LONG, Writer, exact_or_ball, interval_text
@@ -103,7 +103,7 @@ def stated_ends(
 
     Examples
     --------
-    >>> from ptcc_certify.bounds.final_state import enclose, enclosed_final_state
+    >>> from ptcc_certify.bounds.final_state.of_graph import enclose, enclosed_final_state
     >>> graph = SignedDigraph.from_edges([("a", "c", 1), ("b", "c", 9)])
     >>> matrix = enclose(influence(graph, exact=False))
     >>> begin = [Fraction(1), Fraction(0), Fraction(0)]

@@ -15,9 +15,11 @@ from lmi import search_time as deadline
 from lmi.child_process import apart
 from lmi.errors import LMIError, NoCertificate, OutOfTime
 from lmi.search_time import share_of_time
-from ptcc_certify.bounds.enclosed_ends import Interval
+from ptcc_certify.bounds.delay.late_messages import LateBounds, bound_late
+from ptcc_certify.bounds.delay.longest_delay import LateCase
 from ptcc_certify.bounds.envelope import FRACTIONS
-from ptcc_certify.bounds.final_state import (
+from ptcc_certify.bounds.final_state.enclosed_ends import Interval
+from ptcc_certify.bounds.final_state.of_graph import (
     FinalState,
     Influence,
     NotEnclosedError,
@@ -28,8 +30,6 @@ from ptcc_certify.bounds.final_state import (
     influence_in_floats,
     takes_long,
 )
-from ptcc_certify.bounds.late_messages import LateBounds, bound_late
-from ptcc_certify.bounds.longest_delay import LateCase
 from ptcc_certify.bounds.tracking import Tracking, bound_tracking
 from ptcc_certify.certificate.agents_part import AgentsPart, prove_agents, with_instants, with_phases
 from ptcc_certify.certificate.agents_request import (

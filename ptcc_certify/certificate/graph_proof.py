@@ -13,16 +13,16 @@ from functools import cached_property
 
 import numpy as np
 
-from ptcc_certify.bounds.deviation_from_final_state import DeviationGeometry
-from ptcc_certify.bounds.enclosed_ends import final_state_witness
+from ptcc_certify.bounds.delay.late_messages import late_obligations
+from ptcc_certify.bounds.delay.small_delays import DecayingForm
+from ptcc_certify.bounds.deviation.from_final_state import DeviationGeometry
 from ptcc_certify.bounds.envelope import Envelope
-from ptcc_certify.bounds.final_state import FinalState, Influence, influence
+from ptcc_certify.bounds.final_state.enclosed_ends import final_state_witness
+from ptcc_certify.bounds.final_state.of_graph import FinalState, Influence, influence
 from ptcc_certify.bounds.input.effort import Effort
 from ptcc_certify.bounds.input.effort_bounds import InputRequest, bound_effort, full_constants
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
-from ptcc_certify.bounds.late_messages import late_obligations
 from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
-from ptcc_certify.bounds.small_delays import DecayingForm
 from ptcc_certify.bounds.tracking import tracking_obligations
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.proof import Proof

@@ -10,8 +10,8 @@ from itertools import islice
 from typing import Any
 
 from lmi.exact.decimal_rounding import down, near, up
-from ptcc_certify.bounds.late_messages import LateBounds
-from ptcc_certify.bounds.missed_deadline import Missed
+from ptcc_certify.bounds.delay.late_messages import LateBounds
+from ptcc_certify.bounds.delay.missed_deadline import Missed
 from ptcc_certify.bounds.tracking import Tracking
 from ptcc_certify.certificate.constrained_switching.claims import LastModeClaim
 from ptcc_certify.certificate.constrained_switching.reasons import reasons_for_none

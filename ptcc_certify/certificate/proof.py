@@ -8,8 +8,8 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from ptcc_certify.bounds.delay.late_messages import LateBounds
 from ptcc_certify.bounds.input.effort import Effort
-from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.bounds.tracking import Tracking
 from ptcc_certify.certificate.request import Expectations, Question, Request
 from ptcc_certify.checker import CheckReport

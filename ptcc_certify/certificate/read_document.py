@@ -7,9 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from ptcc_certify.bounds.delay.late_messages import read_late
 from ptcc_certify.bounds.float_conversion import fractions
 from ptcc_certify.bounds.input.effort import read_effort
-from ptcc_certify.bounds.late_messages import read_late
 from ptcc_certify.bounds.tracking import read_tracking
 from ptcc_certify.certificate.agents_answer import AgentsAnswer, rows_of
 from ptcc_certify.certificate.agents_part import read_matrix

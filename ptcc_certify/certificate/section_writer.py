@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import numpy as np
 
-from ptcc_certify.bounds.enclosed_ends import DECIMALS, RADIUS
+from ptcc_certify.bounds.final_state.enclosed_ends import DECIMALS, RADIUS
 from ptcc_certify.bounds.float_conversion import floats
 from ptcc_certify.checker.reading import Interval, RejectedError
 from ptcc_certify.checker.sections import Pattern, Rule, declared

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from ptcc_certify.bounds.delay.late_messages import LateBounds, delays, read_messages
 from ptcc_certify.bounds.envelope import FRACTIONS, LAST_INSTANTS
 from ptcc_certify.bounds.input.effort import LIMITS
-from ptcc_certify.bounds.late_messages import LateBounds, delays, read_messages
 from ptcc_certify.bounds.tracking import asked_leaders, read_leaders
 from ptcc_certify.certificate.evidence import Evidence, Observations
 from ptcc_certify.certificate.family_proof import FamilyProof

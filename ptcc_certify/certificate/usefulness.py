@@ -20,8 +20,8 @@ from typing import NamedTuple
 import numpy as np
 
 from lmi.exact.decimal_rounding import up
+from ptcc_certify.bounds.delay.late_messages import LateBounds
 from ptcc_certify.bounds.envelope import Envelope
-from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.bounds.tracking import Tracking
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.constrained_switching.bounds import deviation_of_signal

@@ -64,7 +64,7 @@ def messages_of(graphs: Sequence[str], signed: SignedDigraph | Family, options: 
 
 def _needs_cap(signed: SignedDigraph | Family, messages: LateMessages) -> str:
     """Tell that an own state that is late asks for a cap, and what gain agents bear with this delay."""
-    from ptcc_certify.bounds.small_delays import delay_threshold
+    from ptcc_certify.bounds.delay.small_delays import delay_threshold
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.size_limits import EXACT_NODES
     from ptcc_certify.graphs.structure import analyse

@@ -8,7 +8,7 @@ part of the gain raised the bound wherever it was tried. So the deadline is soug
 There, and where agents meet at rest, ``rho2 kappa`` is raised if the input is not bounded by the one that is given.
 
 Deadlines that were not tried are excluded by nothing but what holds for all gains of the protocol:
-:mod:`ptcc_certify.bounds.shortest_time`.
+:mod:`ptcc_certify.bounds.agents.shortest_time`.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from lmi.exact.decimal_rounding import up
-from ptcc_certify.bounds.enclosed_ends import agents_ends
-from ptcc_certify.bounds.shortest_time import shortest_time
+from ptcc_certify.bounds.agents.shortest_time import shortest_time
+from ptcc_certify.bounds.final_state.enclosed_ends import agents_ends
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certification import certify

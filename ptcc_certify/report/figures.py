@@ -9,7 +9,7 @@ from typing import Any
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from ptcc_certify.bounds.late_messages import LateBounds
+from ptcc_certify.bounds.delay.late_messages import LateBounds
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.exit_code import REFUTED
 from ptcc_certify.errors import ParameterError, SimulationError, gated, labelled

@@ -9,7 +9,7 @@ from typing import Any
 from markupsafe import Markup
 
 from lmi.exact.decimal_rounding import counted
-from ptcc_certify.bounds.final_state import extremes
+from ptcc_certify.bounds.final_state.of_graph import extremes
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.constrained_switching.states import states_of_signal
 from ptcc_certify.report import notation as texts

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ptcc_certify.bounds.cascade import drive_integral, input_from, input_is_bounded
+from ptcc_certify.bounds.agents.cascade import drive_integral, input_from, input_is_bounded
 from ptcc_certify.model.gain import Gain
 
 F = Fraction

@@ -13,10 +13,10 @@ from late_certificates import grouped_graph
 
 from lmi.exact.decimal_rounding import float_up
 from ptcc_certify import read_certificate
-from ptcc_certify.bounds.delay_lmi import DelayLMIBounds
-from ptcc_certify.bounds.final_state import influence
-from ptcc_certify.bounds.longest_delay import LateCase
-from ptcc_certify.bounds.small_delays import SmallDelayBounds, delay_threshold
+from ptcc_certify.bounds.delay.delay_lmi import DelayLMIBounds
+from ptcc_certify.bounds.delay.longest_delay import LateCase
+from ptcc_certify.bounds.delay.small_delays import SmallDelayBounds, delay_threshold
+from ptcc_certify.bounds.final_state.of_graph import influence
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.model import NominalProtocol

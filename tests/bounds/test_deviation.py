@@ -18,7 +18,7 @@ from selection import thinned
 
 from lmi.exact.definite import Arithmetic
 from lmi.exact.fast import SMALL_ROWS, FastArithmetic
-from ptcc_certify.bounds.deviation_from_final_state import _constants
+from ptcc_certify.bounds.deviation.from_final_state import _constants
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.certification import certify

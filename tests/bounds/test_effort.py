@@ -17,7 +17,7 @@ from scipy.integrate import trapezoid
 from scipy.linalg import expm
 from selection import thinned
 
-from ptcc_certify.bounds.final_state import final_state
+from ptcc_certify.bounds.final_state.of_graph import final_state
 from ptcc_certify.bounds.input.effort import Effort, EnergyIntegral
 from ptcc_certify.bounds.input.effort_bounds import InputRequest, bound_effort
 from ptcc_certify.bounds.input.initial_set import ellipsoid, initial_set_within

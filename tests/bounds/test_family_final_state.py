@@ -19,9 +19,9 @@ from row_families import (
 )
 from scipy.linalg import expm
 
-import ptcc_certify.bounds.family_final_state as module
-from ptcc_certify.bounds.attracting_box import attracting_box, invariant_intervals
-from ptcc_certify.bounds.family_final_state import final_value, value_ends, weighted_mean_interval
+import ptcc_certify.bounds.final_state.of_family as module
+from ptcc_certify.bounds.final_state.attracting_box import attracting_box, invariant_intervals
+from ptcc_certify.bounds.final_state.of_family import final_value, value_ends, weighted_mean_interval
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.family_rows import follower_decay

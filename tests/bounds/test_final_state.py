@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from ptcc_certify.batch import certify_many
-from ptcc_certify.bounds.final_state import final_state, influence
+from ptcc_certify.bounds.final_state.of_graph import final_state, influence
 from ptcc_certify.bounds.input.initial_set import box, ellipsoid
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.errors import ParameterError

@@ -12,8 +12,8 @@ from generators import all_classes, random_graph
 from scipy.integrate import quad, solve_ivp
 from scipy.linalg import expm
 
-from ptcc_certify.bounds.final_state import influence
-from ptcc_certify.bounds.formation import drift_until_deadline, formation_of_biases
+from ptcc_certify.bounds.agents.formation import drift_until_deadline, formation_of_biases
+from ptcc_certify.bounds.final_state.of_graph import influence
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph

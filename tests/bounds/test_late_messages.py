@@ -20,12 +20,12 @@ from scipy.linalg import expm
 from selection import thinned
 
 from lmi.errors import NoCertificate
-from ptcc_certify.bounds import late_messages
-from ptcc_certify.bounds.final_state import final_state
-from ptcc_certify.bounds.late_messages import LateBounds, bound_late
-from ptcc_certify.bounds.longest_delay import LateCase
-from ptcc_certify.bounds.small_delays import delay_threshold
-from ptcc_certify.bounds.staged_deadlines import levels
+from ptcc_certify.bounds.delay import late_messages
+from ptcc_certify.bounds.delay.late_messages import LateBounds, bound_late
+from ptcc_certify.bounds.delay.longest_delay import LateCase
+from ptcc_certify.bounds.delay.small_delays import delay_threshold
+from ptcc_certify.bounds.delay.staged_deadlines import levels
+from ptcc_certify.bounds.final_state.of_graph import final_state
 from ptcc_certify.bounds.tracking import bound_tracking, drift_integral
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.certification import certify
@@ -607,7 +607,7 @@ def test_64_graphs_whose_leaders_flee_while_messages_are_late_keep_their_bounds(
 ) -> None:
     first = 3000 + 16 * pattern + 4 * part
     monkeypatch.setattr(late_messages, "_TRIED", 3)
-    monkeypatch.setattr("ptcc_certify.bounds.late_steps.MOST_INSTANTS", 300)
+    monkeypatch.setattr("ptcc_certify.bounds.delay.late_steps.MOST_INSTANTS", 300)
     ratios, last = zip(*(_flight_ratio(first + k, pattern, k == 0) for k in range(4)), strict=True)
     assert max(ratios) <= 1 + ROUNDING, ratios
     assert max(last) > 0.3, last

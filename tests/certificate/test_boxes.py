@@ -17,7 +17,7 @@ from row_families import laplacian, random_followers, vertices
 from selection import thinned
 
 from ptcc_certify import Family, NominalProtocol, SlidingModeProtocol
-from ptcc_certify.bounds.attracting_box import box_of_family
+from ptcc_certify.bounds.final_state.attracting_box import box_of_family
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.checker import check
 from ptcc_certify.report.page import report_html

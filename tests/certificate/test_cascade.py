@@ -18,8 +18,8 @@ from generators import all_classes, random_graph
 from oracle_cascade import false_claims_of_cascade, moved
 from scipy.integrate import solve_ivp
 
-from ptcc_certify.bounds.agent_instants import _checked
-from ptcc_certify.bounds.cascade import Roots, course
+from ptcc_certify.bounds.agents.cascade import Roots, course
+from ptcc_certify.bounds.agents.instants import _checked
 from ptcc_certify.certificate.cascade_part import CascadePart
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.certification import certify
@@ -175,7 +175,7 @@ def with_larger_alpha(part: CascadePart) -> CascadePart:
 
 @pytest.mark.parametrize("change", [with_smaller_roots, with_faster_functions, with_larger_alpha])
 def test_false_bounds_are_below_where_agents_are_enclosed_and_below_a_run(change: Any):
-    """Also below one that is judged above the floor of :data:`~ptcc_certify.bounds.agents_comparison.RESOLVED`."""
+    """Also below one that is judged above the floor of :data:`~ptcc_certify.bounds.agents.comparison.RESOLVED`."""
     for seed in (5, 12, 13, 15):
         certificate = certified(case_of(seed), ("paper", "best")[seed % 2], simulation=False)
         part = part_of(certificate)

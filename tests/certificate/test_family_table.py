@@ -8,7 +8,7 @@ from fractions import Fraction
 import pytest
 
 import ptcc_certify as ptcc
-from ptcc_certify.bounds.attracting_box import AttractingBox
+from ptcc_certify.bounds.final_state.attracting_box import AttractingBox
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.model.constrained_switching import DwellTime
 

@@ -21,8 +21,8 @@ from selection import thinned
 
 from lmi.errors import NoCertificate
 from lmi.sparse_h_matrix import SparseHMatrix
-from ptcc_certify.bounds import final_state as final_states
-from ptcc_certify.bounds.final_state import final_state
+from ptcc_certify.bounds.final_state import of_graph as final_states
+from ptcc_certify.bounds.final_state.of_graph import final_state
 from ptcc_certify.certificate import graph_certification
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certification import certify

@@ -18,7 +18,7 @@ from oracle_cascade import false_claims_of_cascade
 from scipy.linalg import expm
 from selection import thinned
 
-from ptcc_certify.bounds import final_state as final_states
+from ptcc_certify.bounds.final_state import of_graph as final_states
 from ptcc_certify.certificate import graph_certification
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.certification import certify

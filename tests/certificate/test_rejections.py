@@ -26,8 +26,8 @@ from ptcc_certify import (
     certify,
     read_graph,
 )
-from ptcc_certify.bounds import missed_deadline
-from ptcc_certify.bounds.missed_deadline import Missed
+from ptcc_certify.bounds.delay import missed_deadline
+from ptcc_certify.bounds.delay.missed_deadline import Missed
 from ptcc_certify.certificate import document
 from ptcc_certify.certificate.certificate_file import RejectedCertificate
 from ptcc_certify.certificate.exit_code import Answer, standing
@@ -177,7 +177,7 @@ def test_a_refutation_rests_on_what_the_check_accepts(monkeypatch: pytest.Monkey
         found = honest(*case)
         return None if found is None else replace(found, bound=found.bound * 2)
 
-    monkeypatch.setattr("ptcc_certify.bounds.late_messages.find_missed", more)
+    monkeypatch.setattr("ptcc_certify.bounds.delay.late_messages.find_missed", more)
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)])
     made = certify(
         graph, PROTOCOL, [1, 3, 4], messages=LATE, asks=Asks(simulation=False, expectations="bipartite consensus")

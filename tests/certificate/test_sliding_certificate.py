@@ -17,7 +17,7 @@ from balls import inverse_decay_integral
 from generators import all_classes, class_cases, random_graph
 from selection import thinned
 
-from ptcc_certify.bounds.final_state import final_state
+from ptcc_certify.bounds.final_state.of_graph import final_state
 from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certification import certify

@@ -37,8 +37,8 @@ from lmi.exact import arithmetic
 from lmi.exact.definite import SparseFactor
 from lmi.exact.polynomials import rank, row_sum
 from ptcc_certify import checker
-from ptcc_certify.bounds import enclosed_ends
-from ptcc_certify.bounds import final_state as final_states
+from ptcc_certify.bounds.final_state import enclosed_ends
+from ptcc_certify.bounds.final_state import of_graph as final_states
 from ptcc_certify.bounds.input.initial_set import box, ellipsoid
 from ptcc_certify.certificate import graph_certification
 from ptcc_certify.certificate import section_writer as vectors

@@ -21,8 +21,8 @@ from selection import thinned
 from side_files import with_factors, with_side_files
 
 from ptcc_certify import checker
-from ptcc_certify.bounds import enclosed_ends
-from ptcc_certify.bounds import final_state as final_states
+from ptcc_certify.bounds.final_state import enclosed_ends
+from ptcc_certify.bounds.final_state import of_graph as final_states
 from ptcc_certify.certificate import graph_certification
 from ptcc_certify.certificate import section_writer as vectors
 from ptcc_certify.certificate.certification import certify

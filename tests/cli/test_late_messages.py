@@ -29,7 +29,7 @@ from ptcc_certify import (
     read_graph,
     simulate,
 )
-from ptcc_certify.bounds.longest_delay import LateCase
+from ptcc_certify.bounds.delay.longest_delay import LateCase
 from ptcc_certify.certificate import section_writer
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.model.asks import Asks

@@ -17,7 +17,7 @@ from generators import all_classes, random_graph
 from mutations import Json, at, changed, mutants, nudged, resealed, without_instants
 from verified import compare, named, program, said
 
-from ptcc_certify.bounds import final_state as final_states
+from ptcc_certify.bounds.final_state import of_graph as final_states
 from ptcc_certify.certificate import graph_certification
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph

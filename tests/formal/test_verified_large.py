@@ -19,7 +19,7 @@ from mutations import Json, changed, mutants, resealed
 from verified import UNREAD, named, program, said, unchecked
 
 from ptcc_certify import SignedDigraph
-from ptcc_certify.bounds import final_state as final_states
+from ptcc_certify.bounds.final_state import of_graph as final_states
 from ptcc_certify.certificate import graph_certification
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker import check

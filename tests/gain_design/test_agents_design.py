@@ -12,7 +12,7 @@ import pytest
 from generators import all_classes, random_graph
 from scipy.optimize import linprog
 
-from ptcc_certify.bounds.shortest_time import shortest_time
+from ptcc_certify.bounds.agents.shortest_time import shortest_time
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker import check
 from ptcc_certify.errors import ParameterError

@@ -12,7 +12,7 @@ from generators import all_classes, random_graph
 from scipy.linalg import expm
 from selection import thinned
 
-from ptcc_certify.bounds.final_state import influence
+from ptcc_certify.bounds.final_state.of_graph import influence
 from ptcc_certify.bounds.input.initial_set import box, ellipsoid
 from ptcc_certify.bounds.input.tightest_bound import usable_functions
 from ptcc_certify.checker.input_formulas import InitialSet

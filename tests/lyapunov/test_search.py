@@ -59,7 +59,7 @@ def test_the_error_system_has_the_nonzero_eigenvalues_of_the_laplacian(name: str
 @pytest.mark.parametrize("name", ["1.1", "2.1 K>=2", "3.1 no single", "disconnected 1.1 2.1"])
 def test_the_exact_basis_lies_in_the_range_of_the_laplacian(name: str):
     """Orthogonal to every exact left null vector, and near the orthonormal basis up to scale."""
-    from ptcc_certify.bounds.final_state import influence
+    from ptcc_certify.bounds.final_state.of_graph import influence
 
     graph = of_class(name)
     structure = analyse(graph)

@@ -16,7 +16,7 @@ from rich.cells import cell_len
 from selection import thinned
 
 import ptcc_certify as ptcc
-from ptcc_certify.bounds.final_state import extremes
+from ptcc_certify.bounds.final_state.of_graph import extremes
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.graph_certification import STEPS
 from ptcc_certify.certificate.verdict import NO_SEARCHES

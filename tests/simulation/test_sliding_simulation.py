@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from selection import thinned
 
-from ptcc_certify.bounds.final_state import final_state
+from ptcc_certify.bounds.final_state.of_graph import final_state
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import lmi
 from lmi import sparse_h_matrix
-from ptcc_certify.bounds.final_state import influence
+from ptcc_certify.bounds.final_state.of_graph import influence
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse

@@ -18,7 +18,7 @@ import numpy as np
 
 from lmi.exact import arithmetic
 from lmi.exact.routh_test import LARGEST, nonzero_spectrum_beyond, tractable
-from ptcc_certify.bounds.final_state import Influence
+from ptcc_certify.bounds.final_state.of_graph import Influence
 from ptcc_certify.bounds.input.effort import (
     Effort,
     Peak,

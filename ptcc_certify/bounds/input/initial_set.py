@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from typing import Any
 
-from ptcc_certify.bounds.final_state import Influence
+from ptcc_certify.bounds.final_state.of_graph import Influence
 from ptcc_certify.checker.input_formulas import InitialSet, Linear
 from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.graphs.io import as_graph, by_label, in_node_order

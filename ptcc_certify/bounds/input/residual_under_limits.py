@@ -10,7 +10,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from ptcc_certify.bounds.final_state import Influence
+from ptcc_certify.bounds.final_state.of_graph import Influence
 from ptcc_certify.bounds.input.effort import Disturbed, Limited, Peak
 from ptcc_certify.bounds.input.tightest_bound import BOUND_BITS, decaying, least, log, round_up
 from ptcc_certify.checker.input_formulas import LAST_PERIODS, InputBounds, Limits, root_above, rounded

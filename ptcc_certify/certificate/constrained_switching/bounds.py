@@ -14,7 +14,7 @@ from fractions import Fraction
 import numpy as np
 
 from lmi.exact.numbers import integers
-from ptcc_certify.bounds.family_deviation import deviation_on_clock
+from ptcc_certify.bounds.deviation.of_family import deviation_on_clock
 from ptcc_certify.certificate.constrained_switching.claims import RateClaim
 from ptcc_certify.certificate.family_proof import BoundFunction, ComponentProof, FamilyProof
 from ptcc_certify.checker.family_function import Scaled

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from ptcc_certify.bounds.final_state import final_state
+from ptcc_certify.bounds.final_state.of_graph import final_state
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certification import certify, certify_case
 from ptcc_certify.certificate.exit_code import CERTIFIED, rejects

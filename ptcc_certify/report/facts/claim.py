@@ -32,7 +32,7 @@ from ptcc_certify.theorems.family_claims import camps, special_behaviours
 from ptcc_certify.theorems.family_groups import AgreeingGroup, FamilyGroups
 
 if TYPE_CHECKING:
-    from ptcc_certify.bounds.attracting_box import AttractingBox
+    from ptcc_certify.bounds.final_state.attracting_box import AttractingBox
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.checker.reading import Interval
 

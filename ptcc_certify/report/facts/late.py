@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, float_up, near, up
-from ptcc_certify.bounds.small_delays import delay_threshold
+from ptcc_certify.bounds.delay.small_delays import delay_threshold
 from ptcc_certify.certificate.facts import Fact, Facts
 from ptcc_certify.errors import Change, joined, labelled
 from ptcc_certify.graphs.size_limits import EXACT_NODES
@@ -19,7 +19,7 @@ from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.report.text_layout import agent_text, shorten_list
 
 if TYPE_CHECKING:
-    from ptcc_certify.bounds.late_messages import LateBounds
+    from ptcc_certify.bounds.delay.late_messages import LateBounds
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.model.base import Protocol
     from ptcc_certify.model.late_messages import LateMessages

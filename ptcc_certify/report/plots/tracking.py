@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from ptcc_certify.bounds.late_messages import LateBounds
+from ptcc_certify.bounds.delay.late_messages import LateBounds
 from ptcc_certify.bounds.tracking import Tracking
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import Change, ParameterError

@@ -35,7 +35,7 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import float_down, float_up
 from lmi.exact.elementary_enclosures import rounded
-from ptcc_certify.bounds.agents import States, initial_value, root_product
+from ptcc_certify.bounds.agents.each_agent import States, initial_value, root_product
 from ptcc_certify.bounds.input.tightest_bound import round_up
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction

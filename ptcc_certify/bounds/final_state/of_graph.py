@@ -435,7 +435,7 @@ def extremes(
 
     Examples
     --------
-    >>> from ptcc_certify.bounds.final_state import extremes
+    >>> from ptcc_certify.bounds.final_state.of_graph import extremes
     >>> extremes([5, 2, 9, 9, 2, 2], 1), extremes([9.5, Fraction(19, 2)], 1, [Fraction(1, 99), Fraction(0)])
     (([2], [1]), ([1], [0]))
     """

@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_up
-from ptcc_certify.bounds.agents import error_constants, root_product
+from ptcc_certify.bounds.agents.each_agent import error_constants, root_product
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.simulation.agents import AgentsTrajectory

@@ -13,8 +13,8 @@ from fractions import Fraction
 
 import numpy as np
 
-from ptcc_certify.bounds.family_deviation import Function, RestStates, above, deviation_on_clock, input_on_clock
-from ptcc_certify.bounds.heard_deviation import HeardRows
+from ptcc_certify.bounds.deviation.heard import HeardRows
+from ptcc_certify.bounds.deviation.of_family import Function, RestStates, above, deviation_on_clock, input_on_clock
 from ptcc_certify.checker.reading import Interval
 
 

@@ -28,13 +28,13 @@ from lmi.dyadic import round_to_bits
 from lmi.errors import LMIError, NoCertificate
 from lmi.exact.decimal_rounding import float_up, up
 from lmi.exact.elementary_enclosures import log, rounded
-from ptcc_certify.bounds.delay_lmi import DelayLMIBound
+from ptcc_certify.bounds.delay.delay_lmi import DelayLMIBound
+from ptcc_certify.bounds.delay.late_steps import Steps, bound_steps, search_steps
+from ptcc_certify.bounds.delay.missed_deadline import Missed, find_missed
+from ptcc_certify.bounds.delay.settling_leaders import Settling
+from ptcc_certify.bounds.delay.small_delays import SmallDelays, left_above
+from ptcc_certify.bounds.delay.staged_deadlines import stage_deadlines
 from ptcc_certify.bounds.float_conversion import floats, floats_up
-from ptcc_certify.bounds.late_steps import Steps, bound_steps, search_steps
-from ptcc_certify.bounds.missed_deadline import Missed, find_missed
-from ptcc_certify.bounds.settling_leaders import Settling
-from ptcc_certify.bounds.small_delays import SmallDelays, left_above
-from ptcc_certify.bounds.staged_deadlines import stage_deadlines
 from ptcc_certify.bounds.tracking import drift_integral
 from ptcc_certify.bounds.virtual_positions import VehicleBounds, bound_vehicles, read_vehicles, vehicles_section
 from ptcc_certify.checker.delay_lmi import LateLMI, LateLMIWitness

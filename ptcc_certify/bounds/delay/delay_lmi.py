@@ -23,8 +23,8 @@ from lmi.exact.decimal_rounding import float_up
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.numbers import common_denominator
 from lmi.exact.work import WorkError
-from ptcc_certify.bounds.final_state import Influence
-from ptcc_certify.bounds.small_delays import left_above
+from ptcc_certify.bounds.delay.small_delays import left_above
+from ptcc_certify.bounds.final_state.of_graph import Influence
 from ptcc_certify.checker.delay_lmi import DelayLMI, LateLoop, Row, channels_of
 from ptcc_certify.checker.input_formulas import BITS, Limits
 from ptcc_certify.checker.late_input import gain_above

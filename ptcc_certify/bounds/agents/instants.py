@@ -15,7 +15,7 @@ from itertools import islice
 
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.work import WorkError, limited
-from ptcc_certify.bounds.agents import States
+from ptcc_certify.bounds.agents.each_agent import States
 from ptcc_certify.checker.agent_bounds import Begin
 from ptcc_certify.checker.agent_cascade import halvings_of, roots_above
 from ptcc_certify.checker.agent_instants import halvings, value_above

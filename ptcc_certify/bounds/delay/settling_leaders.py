@@ -20,7 +20,7 @@ import numpy as np
 from lmi.dyadic import round_to_bits
 from lmi.exact.decimal_rounding import float_up
 from lmi.exact.elementary_enclosures import log, rounded
-from ptcc_certify.bounds.small_delays import DecayingForm, left_above
+from ptcc_certify.bounds.delay.small_delays import DecayingForm, left_above
 from ptcc_certify.checker.input_formulas import BITS, Limits, root_above
 from ptcc_certify.checker.late_input import gain_above
 from ptcc_certify.checker.late_messages import PARTS

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ptcc_certify.bounds.delay_lmi import DelayLMIBounds
-from ptcc_certify.bounds.final_state import Influence
-from ptcc_certify.bounds.late_messages import LateBounds, bound_late
-from ptcc_certify.bounds.settling_leaders import SettlingBounds
-from ptcc_certify.bounds.small_delays import DecayingForm, SmallDelayBounds
+from ptcc_certify.bounds.delay.delay_lmi import DelayLMIBounds
+from ptcc_certify.bounds.delay.late_messages import LateBounds, bound_late
+from ptcc_certify.bounds.delay.settling_leaders import SettlingBounds
+from ptcc_certify.bounds.delay.small_delays import DecayingForm, SmallDelayBounds
+from ptcc_certify.bounds.final_state.of_graph import Influence
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.model.base import Protocol
 from ptcc_certify.model.late_messages import LateMessages

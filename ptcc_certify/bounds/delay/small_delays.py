@@ -19,7 +19,7 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import float_up
 from lmi.exact.elementary_enclosures import exp, rounded
-from ptcc_certify.bounds.final_state import Influence
+from ptcc_certify.bounds.final_state.of_graph import Influence
 from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above, root_above
 from ptcc_certify.checker.late_input import gain_above
 from ptcc_certify.checker.quadratic_form import Form

@@ -22,7 +22,7 @@ import numpy as np
 from lmi.exact import arithmetic
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.fast import floats, unit_diagonal
-from ptcc_certify.bounds.final_state import Influence
+from ptcc_certify.bounds.final_state.of_graph import Influence
 from ptcc_certify.bounds.input.initial_set import ways
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import DeviationBound, LyapunovFunction

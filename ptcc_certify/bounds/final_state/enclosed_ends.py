@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from ptcc_certify.bounds.final_state import Influence, enclosed_ends
+from ptcc_certify.bounds.final_state.of_graph import Influence, enclosed_ends
 from ptcc_certify.graphs.rationals import writable
 from ptcc_certify.graphs.structure import Structure
 
