@@ -183,9 +183,14 @@ def _read_initial_state(initial_state: StateLike, seed: Any, graph: SignedDigrap
 
 
 def _columns(certificate: Certificate) -> Row:
-    structure, effort, comparison = certificate.structure, certificate.effort, certificate.comparison
-    rate = certificate.rate
-    result, reaching = certificate.final_state, certificate.reaching
+    proof = certificate.graph_proof
+    structure, effort, comparison = (
+        proof.structure,
+        proof.effort,
+        certificate.comparison,
+    )
+    rate = proof.rate
+    result, reaching = proof.final_state, proof.reaching
     return {
         "connectivity": structure.connectivity,
         "components": len(structure.components),
@@ -194,18 +199,18 @@ def _columns(certificate: Certificate) -> Row:
         "closed_components": len(structure.closed_components),
         "balanced_leaders": sum(c.balanced for c in structure.closed_components),
         "balanced": structure.balanced,
-        "theorem": "; ".join(dict.fromkeys(claim.theorem for claim in certificate.claims)),
-        "behaviour": "; ".join(dict.fromkeys(claim.behaviour for claim in certificate.claims)),
+        "theorem": "; ".join(dict.fromkeys(claim.theorem for claim in proof.claims)),
+        "behaviour": "; ".join(dict.fromkeys(claim.behaviour for claim in proof.claims)),
         "verdict": certificate.verdict,
         "useful": certificate.assessment.useful,
         "asked": certificate.assessment.asked,
         "rate": _down(rate),
-        "upper_bound": _up(certificate.upper_bound),
-        "optimality_ratio": certificate.optimality_ratio,
-        "fastest": None if rate is None else certificate.fastest.kind,
-        "overshoot": _up(certificate.overshoot),
-        "paper_rate": _down(certificate.paper_rate),
-        "diagonal_rate": _down(certificate.diagonal_rate),
+        "upper_bound": _up(proof.upper_bound),
+        "optimality_ratio": proof.optimality_ratio,
+        "fastest": None if rate is None else proof.fastest.kind,
+        "overshoot": _up(proof.overshoot),
+        "paper_rate": _down(proof.paper_rate),
+        "diagonal_rate": _down(proof.diagonal_rate),
         "input_bounded": None if effort is None else effort.bounded,
         "peak_input": None if effort is None or effort.peak is None else _up(Fraction(effort.peak.largest)),
         "largest_final_state": None if result is None else _finite(float(np.abs(np.asarray(result)).max())),
@@ -214,8 +219,8 @@ def _columns(certificate: Certificate) -> Row:
         "worst_ratio": None if comparison is None else _finite(comparison.worst_ratio),
         "bound_kept": None if comparison is None else not comparison.violated,
         "obligations": len(certificate.obligations),
-        "cut_off": one_line("; ".join(certificate.cut_off)) or None,
-        "note": one_line("; ".join(certificate.notes)) or None,
+        "cut_off": one_line("; ".join(certificate.observed.cut_off)) or None,
+        "note": one_line("; ".join(certificate.observed.notes)) or None,
     }
 
 

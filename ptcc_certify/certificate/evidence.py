@@ -61,6 +61,8 @@ class Observations:
     agents_run: AgentsTrajectory | None = None
 
 
+#: True for the type checker of this project alone: its own code asks the parts themselves, of which types are known.
+WHOLE_PARTS_ALONE = False
 #: What may be put to a certificate that was read: what is asked, and what was seen.
 _OF_NO_FILE = {"expectations", *(part.name for part in fields(Observations))} - {"search"}
 #: Where agents begin.
@@ -85,11 +87,13 @@ class Evidence(OfQuestion, Shown):
         """Of whom it is, under which protocol, from where, and what was asked beside."""
         return self.proof.question
 
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("__") or name in ("proof", "observed"):
-            raise AttributeError(name)
-        part = self.observed if hasattr(type(self.observed), name) else self.proof
-        return getattr(part, name)
+    if not WHOLE_PARTS_ALONE:
+
+        def __getattr__(self, name: str) -> Any:
+            if name.startswith("__") or name in ("proof", "observed"):
+                raise AttributeError(name)
+            part = self.observed if hasattr(type(self.observed), name) else self.proof
+            return getattr(part, name)
 
     @property
     def graph_proof(self) -> GraphProof:

@@ -113,7 +113,7 @@ def compare(certificate: Certificate, run: Trajectory) -> FamilyComparison:
     if run.deadline_index is not None and run.deadline_resolved:
         moved = np.abs(run.states[:, before] - run.final_state[:, None]) - floor
         judged = int((moved > 0).sum())
-        deviation = _worst(moved, certificate.deviation_bound(run.remaining[before]))
+        deviation = _worst(moved, certificate.proof.deviation_bound(run.remaining[before]))
     modes = None
     if certificate.direct:
         ratios = [_lyapunov_ratios(*one, run, floor) for one in functions_of(certificate)]
@@ -141,14 +141,14 @@ def worst_case_signals(certificate: Certificate, step: float | None = None) -> l
     step : float, optional
         On the clock, as for :class:`~ptcc_certify.simulation.signals.WorstCaseSignal`.
     """
-    n = certificate.family.n_nodes
+    n = certificate.family_proof.family.n_nodes
     against = [WorstCaseSignal.against(V, quotient, nodes, n, step) for nodes, quotient, V in functions_of(certificate)]
     return [*against, WorstCaseSignal(step=step)]
 
 
 def functions_of(certificate: Certificate) -> Iterator[tuple[np.ndarray, Quotient, FamilyFunction]]:
     """Yield every quadratic Lyapunov function with the nodes of its component and the coordinates it is in."""
-    for part in certificate.parts:
+    for part in certificate.family_proof.parts:
         quadratic = [V for V in part.functions if isinstance(V, FamilyFunction)]
         quotient = Quotient.of(part.component) if quadratic else None
         for V in quadratic:
@@ -161,7 +161,10 @@ def _require_same(certificate: Certificate, run: Trajectory) -> None:
         raise ParameterError(f"{shorten(repr(run))} is no run of a family; give what simulate returned of one")
     if certificate.initial_state is None:
         raise ParameterError("the certificate has no initial state; certify the family with x0")
-    if run.played.family is not certificate.family and run.played.family != certificate.family:
+    if (
+        run.played.family is not certificate.family_proof.family
+        and run.played.family != certificate.family_proof.family
+    ):
         raise ParameterError("the run is of another family than the certificate")
     for name, same in (
         ("protocol", _same_protocol(certificate, run)),
@@ -190,7 +193,7 @@ def _worst(values: np.ndarray, bounds: np.ndarray) -> float | None:
 
 
 def _final_ratio(certificate: Certificate, run: Trajectory, floor: float) -> float | None:
-    ends = certificate.final_state
+    ends = certificate.proof.final_state
     if run.deadline_index is None or not run.deadline_resolved or ends is None:
         return None
     known = [k for k, interval in enumerate(ends) if interval is not None]
@@ -203,9 +206,13 @@ def _final_ratio(certificate: Certificate, run: Trajectory, floor: float) -> flo
 
 def _input_ratio(certificate: Certificate, run: Trajectory, floor: float) -> float | None:
     """Return the worst ratio of inputs, and of their nominal parts, to their peaks."""
+    proof = certificate.family_proof
     gain = run.protocol.gain.value_at_remaining(run.remaining)
-    error, ratios = np.multiply.outer(2 * Members(certificate.family).in_weight * floor, gain), []
-    for values, peaks in ((run.input, certificate.input_peaks), (gain * run.error, certificate.nominal_peaks)):
+    error, ratios = np.multiply.outer(2 * Members(proof.family).in_weight * floor, gain), []
+    for values, peaks in (
+        (run.input, proof.input_peaks),
+        (gain * run.error, proof.nominal_peaks),
+    ):
         if peaks is not None:
             ratios.append(_worst(np.abs(values) - error, np.array([[float(peak)] for peak in peaks])))
     return max((ratio for ratio in ratios if ratio is not None), default=None)
@@ -214,7 +221,7 @@ def _input_ratio(certificate: Certificate, run: Trajectory, floor: float) -> flo
 def _sliding_ratio(certificate: Certificate, run: Trajectory) -> float | None:
     """Return the worst ratio of sliding variables to ``psi |sigma_k(0)|``."""
     sliding = run.sliding
-    reaching, protocol = certificate.reaching, certificate.protocol.reaching
+    reaching, protocol = certificate.proof.reaching, certificate.protocol.reaching
     if sliding is None or reaching is None or protocol is None or certificate.direct:
         return None
     certain = np.array([np.inf if r.z is None else float(r.z) for r in reaching])
@@ -227,14 +234,15 @@ def _sliding_ratio(certificate: Certificate, run: Trajectory) -> float | None:
 
 def _driven_ratios(certificate: Certificate, run: Trajectory, floor: float) -> Iterator[float]:
     """Yield the worst ratio of ``sqrt(V(x - sigma))`` to its bound, of every quadratic function that decays."""
+    proof = certificate.family_proof
     assert run.sliding is not None
     before = np.isfinite(run.clock)
     y = (run.states - run.sliding.sigma)[:, before]
-    for number, part in enumerate(certificate.parts):
-        for V, own in zip(part.functions, certificate.bound_functions[number], strict=True):
+    for number, part in enumerate(proof.parts):
+        for V, own in zip(part.functions, proof.bound_functions[number], strict=True):
             if isinstance(V, FamilyFunction) and isinstance(own, BoundFunction) and V.rate > 0:
                 root, size = _roots(part.component.nodes, own.quotient, V, y, floor)
-                bound = certificate.norm_bound(own, number, run.remaining[before])
+                bound = proof.norm_bound(own, number, run.remaining[before])
                 yield _worst(root - size, bound) or 0.0
 
 

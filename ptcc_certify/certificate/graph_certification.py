@@ -93,22 +93,22 @@ SETTLED = 1e-6
 
 def with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: bool) -> Certificate:
     """Return the certificate of a graph as one of agents of order n on it."""
-    functions = certificate.functions
+    functions = certificate.graph_proof.functions
     try:
         prove = prove_agents if agents.cascade is None else prove_cascade
         proof = prove(
-            certificate.structure,
+            certificate.graph_proof.structure,
             certificate.protocol,
             agents,
             functions,
-            certificate.influence,
+            certificate.graph_proof.influence,
             chains.offsets,
             chains.states,
         )
     except NoCertificate as error:
         raise ParameterError("agents", f"{error}; ask for a smaller decay or a lower order") from None
     proof = with_instants(with_phases(proof)) if isinstance(proof, AgentsPart) else proof
-    notes, cut_off = [*certificate.notes, *chains.notes], list(certificate.cut_off)
+    notes, cut_off = [*certificate.observed.notes, *chains.notes], list(certificate.observed.cut_off)
     motion = None
     if run and proof.initial_state is not None:
         limit = SEARCHING * certificate.time_limit
@@ -122,21 +122,21 @@ def with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: b
 
 def with_small_delays(certificate: Certificate) -> Certificate:
     """Add what Lyapunov functions of the whole graph prove with late messages, and the longest delay that was asked."""
-    late, final = certificate.late, certificate.final_state
+    late, final = certificate.proof.late, certificate.graph_proof.final_state
     if late is None or late.messages.vehicles is not None:
         return certificate
     case = LateCase(
-        certificate.structure,
+        certificate.graph_proof.structure,
         certificate.protocol,
         certificate.initial_state,
-        stated_ends(certificate.influence, final, certificate.initial_state),
-        certificate.influence,
-        certificate.decaying_forms,
+        stated_ends(certificate.graph_proof.influence, final, certificate.initial_state),
+        certificate.graph_proof.influence,
+        certificate.graph_proof.decaying_forms,
         late.leaders,
     )
     late = replace(case.with_forms(late), longest_delay=case.longest_forgiven(late.messages))
     certificate, asked = certificate.changed(late=late), certificate.expectations.max_residual
-    if asked is not None and late.messages.age and certificate.graph.n_nodes <= EXACT_NODES:
+    if asked is not None and late.messages.age and certificate.graph_proof.graph.n_nodes <= EXACT_NODES:
         certificate = certificate.changed(late=replace(late, enough=_longest_delay(certificate, case, late, asked)))
     return certificate
 
@@ -162,10 +162,10 @@ def with_word_of_check(certificate: Certificate) -> Certificate:
     assert report is not None, "the certificate of a graph is always checked"
     if report.accepted and report.memory > 1:
         note = f"the check of this certificate needs more than 1 GB: allow {math.ceil(report.memory)} GB of memory"
-        return certificate.changed(notes=(*certificate.notes, note))
+        return certificate.changed(notes=(*certificate.observed.notes, note))
     if not report.accepted:
         note = f"the independent check does not accept {report.rejected}: {report.reason}"
-        return certificate.changed(notes=(note, *certificate.notes))
+        return certificate.changed(notes=(note, *certificate.observed.notes))
     return certificate
 
 

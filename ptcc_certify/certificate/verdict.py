@@ -105,7 +105,7 @@ def _next_step(certificate: Evidence, report: CheckReport | None) -> Sentence:
             return f"no rate is proved: a leader group of {most} nodes is too much; certify followers and leaders apart"
         mend = Change("method", "lmi") if n > EXACT_NODES else "rounding the weights to fewer digits"
         return "no rate is proved; try ", mend
-    if "final state" in certificate.cut_off:
+    if "final state" in certificate.observed.cut_off:
         share = f"the final state is not proved, it took its share of {certificate.time_limit:g} s; raise "
         return share, Change("time_limit")
     return (

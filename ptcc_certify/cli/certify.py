@@ -158,10 +158,10 @@ def _log_result(certificate: Certificate) -> None:
     search = certificate.search
     for kind, rate in search.searched.items():
         LOG.info("searched %s: numerical decay rate %.6g", kind, rate)
-    for V in certificate.functions:
+    for V in certificate.graph_proof.functions:
         LOG.info("proved %s: decay rate %s", V.kind, down(V.proved_rate))
-    for part in certificate.cut_off:
+    for part in certificate.observed.cut_off:
         LOG.warning("cut off by the time limit of %g s: %s", certificate.time_limit, part)
-    for note in certificate.notes:
+    for note in certificate.observed.notes:
         LOG.info("note: %s", one_line(note))
     LOG.info("verdict %s; exit code %d", in_flags(certificate.assessment.sentence), certificate.assessment.exit_code)

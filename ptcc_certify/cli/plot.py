@@ -156,24 +156,28 @@ def _of_certificate(path: str, what: str | None, options: shared.Options) -> tup
     with progress(("independent check", "simulation")) as begin:
         begin("independent check")
         certificate = read_certificate(path, memory=options["memory"])
-        agents = certificate.agents
+        agents = certificate.proof.agents
         of_agents = agents is not None
         if begins and (of_agents or certificate.initial_state is not None):
             mend = "certify agents of order n with it" if of_agents else f"the certificate {path} has its own"
             raise ParameterError(f"--x0, or --seed, is for what holds no initial state; {mend}")
-        what = what or certificate.main_figure
+        what = what or certificate.proof.main_figure
         of_these = OF_AGENTS if agents is None or agents.dimension == 2 else ("motion",)
-        own = tuple({certificate.main_figure} & set(OF_A_CERTIFICATE))  # of late messages, or of moving leaders
+        own = tuple({certificate.proof.main_figure} & set(OF_A_CERTIFICATE))  # of late messages, or of moving leaders
         drawn, others = ((*of_these, *_SHARED), OF_A_RUN) if of_agents else ((*own, *OF_A_RUN), OF_AGENTS)
         if what in others and what not in drawn:
             raise ParameterError(f"--what {what} is not drawn of {path}; ask for --what {' or '.join(drawn)}")
         if of_agents or what not in OF_A_RUN:
             return what, certificate
         if begins:
-            one = certificate.family.modes[0].mandatory if certificate.of_family else certificate.graph
+            one = (
+                certificate.family_proof.family.modes[0].mandatory
+                if certificate.of_family
+                else certificate.graph_proof.graph
+            )
             x0 = shared.read_initial_state(options["x0"], options["seed"], one)
-            if certificate.offsets is not None:
-                x0 = [x - h for x, h in zip(x0, certificate.offsets, strict=True)]
+            if certificate.proof.offsets is not None:
+                x0 = [x - h for x, h in zip(x0, certificate.proof.offsets, strict=True)]
             question = replace(certificate.question, initial_state=tuple(x0))
             proof = replace(certificate.proof, question=question)  # to be drawn: what is proved holds for all
             certificate = replace(certificate, proof=proof)

@@ -71,10 +71,10 @@ class AgentsDesign(DesignAnswer):
     @property
     def gains_text(self) -> str:
         """The parameters of the protocol, exact, and the gains of the agents; empty where there are none."""
-        if self.protocol is None or self.certificate is None or self.certificate.agents is None:
+        if self.protocol is None or self.certificate is None or self.certificate.proof.agents is None:
             return ""
         text = ", ".join(f"{name}={short_exact(value)}" for name, value in self.protocol.parameters.items())
-        return f"{text}; {self.certificate.agents.gains_text}"
+        return f"{text}; {self.certificate.proof.agents.gains_text}"
 
     @property
     def deadline_text(self) -> str:

@@ -109,16 +109,16 @@ class Search:
         return self.tried[T]
 
     def _prove(self, T: Fraction) -> Candidate | None:
-        first, protocol = self.base.agents, at_deadline(self.template, T)
+        first, protocol = self.base.proof.agents, at_deadline(self.template, T)
         assert first is not None
         prove = prove_agents if self.agents.cascade is None else prove_cascade
         try:
             part: AgentsAnswer = prove(
-                self.base.structure,
+                self.base.graph_proof.structure,
                 protocol,
                 self.agents,
-                self.base.functions,
-                self.base.influence,
+                self.base.graph_proof.functions,
+                self.base.graph_proof.influence,
                 first.protocol.offsets,
                 first.initial_state,
             )

@@ -111,10 +111,10 @@ def design_agents(
     graph, asks = graph if orientation is None else as_graph(graph, orientation), Asks(simulation=False)
     first = request.deadline or min(Fraction(1), longest(agents) / 2)
     base = certify(graph, at_deadline(template, first), x0, agents=agents, asks=asks)
-    if base.agents is not None and base.agents.bounding_rho2 is not None:
-        template = template.replace(rho2=base.agents.bounding_rho2)
+    if base.proof.agents is not None and base.proof.agents.bounding_rho2 is not None:
+        template = template.replace(rho2=base.proof.agents.bounding_rho2)
         base = certify(graph, at_deadline(template, first), x0, agents=agents, asks=asks)
-    part = base.agents
+    part = base.proof.agents
     if part is None or part.initial_state is None:
         raise ParameterError(("design of agents of order n starts from an initial state; give ", Change("x0")))
     least = _least_time(base, request)
@@ -158,10 +158,12 @@ def _refuse(agents: Any, request: Request) -> None:
 
 def _least_time(base: Certificate, request: Request) -> Fraction | None:
     """Return a deadline below which no input within the limit suffices; None if nothing is known."""
-    part = base.agents
+    part = base.proof.agents
     if part is None or part.initial_state is None or any(part.protocol.plant) or part.protocol.gain_cap is not None:
         return None
-    if any(part.protocol.own) or not base.influence.exact:  # where agents that rest end depends on the gains
+    if (
+        any(part.protocol.own) or not base.graph_proof.influence.exact
+    ):  # where agents that rest end depends on the gains
         return None
     zero, offsets = Fraction(0), part.protocol.offsets
     deviations: list[list[list[Fraction]]] = [[[] for _ in row] for row in offsets]
@@ -170,7 +172,7 @@ def _least_time(base: Certificate, request: Request) -> Fraction | None:
             begin = [
                 agent[q][i] - (h[q] if i == 0 else 0) for agent, h in zip(part.initial_state, offsets, strict=True)
             ]
-            ends = agents_ends(base.influence, [(x, zero) for x in begin])
+            ends = agents_ends(base.graph_proof.influence, [(x, zero) for x in begin])
             if any(radius for _, radius in ends):
                 return None
             for k, (x, (end, _)) in enumerate(zip(begin, ends, strict=True)):
@@ -184,7 +186,7 @@ def _unusable(base: Certificate, part: AgentsAnswer, request: Request) -> str | 
         least = up(1 / part.protocol.gain.pole, 4)
         return f"no agent listens to another, and the input grows without limit: give cascade {least} or more"
     if not part.functions and not part.alone:
-        return base.notes[0] if base.notes else "no decay was proved"
+        return base.observed.notes[0] if base.observed.notes else "no decay was proved"
     if part.unbounded:
         at = f"at T = {short_exact(part.protocol.gain.T)}"
         return f"the input is not proved bounded {at}: {', '.join(why for why, _ in part.unbounded)}"
@@ -206,7 +208,7 @@ def _unusable(base: Certificate, part: AgentsAnswer, request: Request) -> str | 
 def _with(blank: AgentsDesign, candidate: Candidate, base: Certificate, again: Certificate) -> AgentsDesign:
     """Return the answer with a certificate: the one that certify makes by itself, if it meets what is asked."""
     asked = blank.asked
-    own = None if again.agents is None else Candidate(candidate.deadline, candidate.protocol, again.agents)
+    own = None if again.proof.agents is None else Candidate(candidate.deadline, candidate.protocol, again.proof.agents)
     repeatable = own is not None and own.meets(asked) and again.verdict == "certified"
     if own is None or not repeatable:
         own, changes = candidate, {"protocol": candidate.protocol, "agents": candidate.part}
@@ -215,7 +217,7 @@ def _with(blank: AgentsDesign, candidate: Candidate, base: Certificate, again: C
             return replace(blank, binding=refused)
     peak, residual, inputs = own.peak, own.residual, own.part.inputs
     assert peak is not None and residual is not None and inputs is not None
-    label = again.graph.labels[inputs.index(peak)]
+    label = again.graph_proof.graph.labels[inputs.index(peak)]
     binding = f"the bound of the input of agent {shorten(label)}, {up(100 * peak / asked.max_input, 4)} % of the limit"
     if asked.residual is not None and residual / asked.residual > peak / asked.max_input:
         binding = f"what the gain cap leaves, {up(100 * residual / asked.residual, 4)} % of what is allowed"

@@ -239,7 +239,7 @@ class Design(DesignAnswer):
         """The initial state from which the input gets largest under these gains (numerical); None without gains."""
         if self.certificate is None:
             return None
-        case = self.certificate.structure, self.certificate.protocol, self.asked.initial_set
+        case = self.certificate.graph_proof.structure, self.certificate.protocol, self.asked.initial_set
         if self.gain_cap is None:
             return worst_initial_state(*case)
         # The gain is constant, and max |e_k| never grows.

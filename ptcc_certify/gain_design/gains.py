@@ -37,8 +37,8 @@ def options(base: Certificate, request: DesignRequest) -> list[Option]:
     agents: list[int | None] = [None] if request.input_norm == 2 else [*range(len(bounds.rows))]
     largest = [bounds.error_norm if v is None else bounds.error_bounds[v] for v in agents]
     top = max(largest)
-    if base.constant or top == 0 or not functions:
-        return [Option(Fraction(1), Fraction(1), None, Fraction(0))] if base.constant or top == 0 else []
+    if base.proof.constant or top == 0 or not functions:
+        return [Option(Fraction(1), Fraction(1), None, Fraction(0))] if base.proof.constant or top == 0 else []
     rates = {i: bounds.form(i).rate for i in functions}
     decay = {i: [decaying(bounds, i, v) for v in agents] for i in functions}
     moving = [j for j, h in enumerate(largest) if h and all(decay[i][j] for i in functions)]
@@ -63,7 +63,7 @@ def options(base: Certificate, request: DesignRequest) -> list[Option]:
         options.append(Option(decimal(Fraction(a) * k), k, None, Fraction(product) * least * top))
     if residual is not None:
         for i in functions:
-            bound = base.functions[i].deviation
+            bound = base.graph_proof.functions[i].deviation
             if bound is None:
                 continue
             excess = max(map(log, bound.agents)) / 2 + log(bounds.initial_root(i)) - log(residual)

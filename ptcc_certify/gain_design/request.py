@@ -74,7 +74,7 @@ class Fit(NamedTuple):
 
 def fit_of(cert: Certificate, request: DesignRequest) -> Fit:
     """Return what a certificate proves of its gains: the peak of the input, and what is left at the deadline."""
-    T, effort = cert.protocol.T, cert.effort
+    T, effort = cert.protocol.T, cert.graph_proof.effort
     by_norm = request.input_norm == 2
     if not cert.limits:
         if effort is None or effort.peak is None:
@@ -91,6 +91,7 @@ def fit_of(cert: Certificate, request: DesignRequest) -> Fit:
 
 def input_bounds(base: Certificate, initial_set: InitialSet) -> InputBounds:
     """Return what bounds the input."""
-    constants = base.effort.constants if base.effort is not None else ()
-    rows = base.graph.exact_rows(range(base.graph.n_nodes))
-    return InputBounds(rows, base.protocol.gain.exact, base.forms, constants, initial_set)
+    proof = base.graph_proof
+    constants = proof.effort.constants if proof.effort is not None else ()
+    rows = proof.graph.exact_rows(range(proof.graph.n_nodes))
+    return InputBounds(rows, base.protocol.gain.exact, proof.forms, constants, initial_set)

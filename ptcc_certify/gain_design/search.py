@@ -200,13 +200,13 @@ def _first_protocol(structure: Structure) -> NominalProtocol:
 
 def _unusable(base: Certificate) -> str | None:
     """Tell why the certificate bounds no input; None if it does."""
-    n = base.graph.n_nodes
-    if base.constant:
+    n = base.graph_proof.graph.n_nodes
+    if base.proof.constant:
         return None
     if n > INPUT_NODES:
         return f"the input is bounded up to {INPUT_NODES} agents; the graph has {n}"
-    if base.effort is None:
-        return base.notes[0] if base.notes else "no decay was proved"
+    if base.graph_proof.effort is None:
+        return base.observed.notes[0] if base.observed.notes else "no decay was proved"
     return None
 
 
@@ -231,7 +231,7 @@ def _at(base: Certificate, option: Option, T: Fraction, request: DesignRequest) 
 def _answer_with_gains(blank: Design, fit: Fit) -> Design:
     """Return the answer with gains."""
     assert fit.peak is not None
-    cert, effort, limit = fit.certificate, fit.certificate.effort, blank.asked.max_input
+    cert, effort, limit = fit.certificate, fit.certificate.graph_proof.effort, blank.asked.max_input
     if not fit.peak:
         binding = "nothing binds: no agent moves, whatever the gains"
     elif cert.limits:
@@ -241,7 +241,7 @@ def _answer_with_gains(blank: Design, fit: Fit) -> Design:
         agents, by_norm = effort.peak.agents, blank.asked.input_norm == 2
         v = max(range(len(agents)), key=agents.__getitem__)
         how = effort.peak.norm_how if by_norm else effort.peak.how[v]
-        whose = "||u||" if by_norm else f"the input of agent {shorten(cert.graph.labels[v])}"
+        whose = "||u||" if by_norm else f"the input of agent {shorten(cert.graph_proof.graph.labels[v])}"
         when = f"{nearest_float(fit.deadline) * -math.expm1(-nearest_float(how.z)):.4g}"
         binding = f"{whose}, largest about t = {when}, {_percent(fit.peak, limit)}"
     if blank.asked.input_norm is None:  # an expectation is one of every |u_k|

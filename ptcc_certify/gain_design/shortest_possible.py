@@ -17,14 +17,15 @@ _PRODUCT_BITS = 40
 
 def lower_product(base: Certificate, request: DesignRequest) -> tuple[Fraction | None, str]:
     """Return what ``U T`` is at least, whatever the gains, and why; None if nothing is known."""
+    proof = base.graph_proof
     candidates = [(Fraction(0), "")]
-    initial_set, graph = request.initial_set, base.graph
+    initial_set, graph = request.initial_set, proof.graph
     agents = [shorten(label) for label in graph.labels]
-    if base.influence.exact and graph.n_nodes <= INPUT_NODES:
-        for agent, row in zip(agents, ways(base.influence), strict=True):
+    if proof.influence.exact and graph.n_nodes <= INPUT_NODES:
+        for agent, row in zip(agents, ways(proof.influence), strict=True):
             way = _largest_below(initial_set, row) - (request.residual or 0)
             candidates.append((way, f"the way of agent {agent} to its final state"))
-    limit = base.upper_bound
+    limit = proof.upper_bound
     if request.residual is None and limit and _has_inner_points(initial_set):
         for agent, weights in zip(agents, graph.exact_rows(range(graph.n_nodes)), strict=True):
             candidates.append(

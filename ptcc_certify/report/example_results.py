@@ -51,17 +51,21 @@ def results_csv(runs: Sequence[Run]) -> str:
     """
     table = []
     for example, graph, certificate in runs:
-        claim, paper, comparison = certificate.claim, certificate.paper_rate, certificate.comparison
-        ends, (last, proved, deadline) = certificate.final_state, _reaching_times(certificate)
+        claim, paper, comparison = (
+            certificate.graph_proof.claim,
+            certificate.graph_proof.paper_rate,
+            certificate.comparison,
+        )
+        ends, (last, proved, deadline) = certificate.graph_proof.final_state, _reaching_times(certificate)
         final = [] if ends is None else [f"{k}={x}" for k, x in zip(ends.labels, ends.states, strict=True)]
         row = {
             "example": example.number,
             "graph": graph,
             "claim": claim and claim.behaviour,
             "theorem": claim and claim.theorem,
-            "certified_rate": None if certificate.rate is None else float_down(certificate.rate),
+            "certified_rate": None if certificate.proof.rate is None else float_down(certificate.proof.rate),
             "paper_rate": None if paper is None else float_down(paper),
-            "optimality_ratio": certificate.optimality_ratio,
+            "optimality_ratio": certificate.graph_proof.optimality_ratio,
             "reached_by": proved,
             "T_r": deadline,
             "final_state": "; ".join(final),
@@ -80,7 +84,7 @@ def results_csv(runs: Sequence[Run]) -> str:
 def result_lines(run: Run) -> tuple[str, str]:
     """Return the two lines of an example under :data:`RESULTS_HEAD`; what was proved is rounded to the safe side."""
     certificate = run.certificate
-    claim, rate, comparison = certificate.claim, certificate.rate, certificate.comparison
+    claim, rate, comparison = certificate.graph_proof.claim, certificate.proof.rate, certificate.comparison
     assert claim is not None
     last, proved, deadline = _reaching_times(certificate)
     ratio = comparison.worst_ratio if comparison else 0
@@ -89,14 +93,17 @@ def result_lines(run: Run) -> tuple[str, str]:
         times = f"{last:>10.5f}{up(proved, 5):>11}{deadline:>5.2g}"
     return (
         f"{run.example.number} {run.graph:<7}{claim.theorem:<9}{claim.behaviour:<30}{certificate.assessment.word}",
-        f"{down(rate or Fraction(0)):>18}{down(certificate.optimality_ratio or 0.0, 4):>12}"
+        f"{down(rate or Fraction(0)):>18}{down(certificate.graph_proof.optimality_ratio or 0.0, 4):>12}"
         f"{ratio:>8.3f}{times}  {_ends(certificate)}",
     )
 
 
 def _reaching_times(certificate: Certificate) -> tuple[float | None, float | None, float | None]:
     """Return when the last sliding variable was 0 in the run, when each is proved to be, and ``T_r``; None if none."""
-    reaching, run = certificate.reaching, None if certificate.trajectory is None else certificate.trajectory.sliding
+    reaching, run = (
+        certificate.proof.reaching,
+        None if certificate.trajectory is None else certificate.trajectory.sliding,
+    )
     if reaching is None or run is None:
         return None, None, None
     return float(run.reaching_times.max()), max(r.time for r in reaching), float(run.protocol.T_r)
@@ -104,9 +111,9 @@ def _reaching_times(certificate: Certificate) -> tuple[float | None, float | Non
 
 def _ends(certificate: Certificate) -> str:
     """Return the final state in a few letters: 0, a common size, or the largest, rounded up."""
-    if certificate.final_state is None:
+    if (ends := certificate.graph_proof.final_state) is None:
         return "-"
-    sizes = {abs(Fraction(x)) for x in certificate.final_state.states}
+    sizes = {abs(Fraction(x)) for x in ends.states}
     largest = max(sizes)
     common = near(largest, 5) if sizes == {0} else f"+-{near(largest, 5)}"
     return common if len(sizes) == 1 else f"|x| <= {up(largest, 5)}"

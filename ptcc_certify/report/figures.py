@@ -103,34 +103,36 @@ def draw(
     wanted = tuple(PLOTS) if wanted is None else wanted
     if saved.of_family:
         return _draw_family(saved, wanted, runs, why or [])
-    run, n = saved.trajectory, saved.graph.n_nodes
+    run, n = saved.trajectory, saved.graph_proof.graph.n_nodes
     there = {"graph": n <= DRAWN_NODES}
-    if saved.agents is None:
-        there["final"] = n > DRAWN_NODES and saved.final_state is not None
-        there["degrees"] = n > DRAWN_NODES and saved.graph.n_edges > 0
+    if saved.proof.agents is None:
+        there["final"] = n > DRAWN_NODES and saved.proof.final_state is not None
+        there["degrees"] = n > DRAWN_NODES and saved.graph_proof.graph.n_edges > 0
     if saved.initial_state is not None and n <= EXACT_NODES:
-        there["late"] = saved.late is not None and _late_is_drawn(saved.late, saved.protocol)
-        there["tracking"] = saved.tracking is not None
+        there["late"] = saved.proof.late is not None and _late_is_drawn(saved.proof.late, saved.protocol)
+        there["tracking"] = saved.proof.tracking is not None
     if run is not None:
         slid = run.sliding is not None
-        there["states"] = n <= INPUT_NODES and not saved.constant
-        there["decay"] = saved.comparison is not None and bool(saved.envelope.functions) and bool(run.error.any())
+        there["states"] = n <= INPUT_NODES and not saved.proof.constant
+        there["decay"] = (
+            saved.comparison is not None and bool(saved.graph_proof.envelope.functions) and bool(run.error.any())
+        )
         there["sliding"] = slid and not saved.direct and n <= INPUT_NODES
-        there["input"] = n <= INPUT_NODES and (slid or not saved.constant)
+        there["input"] = n <= INPUT_NODES and (slid or not saved.proof.constant)
     figures = {name: PLOTS[name](saved).figure for name in wanted if there.get(name)}
-    if agents_run is not None and saved.agents is not None:
+    if agents_run is not None and saved.proof.agents is not None:
         figures["motion"] = plot_motion(agents_run)
-        if saved.agents.dimension == 2:
+        if saved.proof.agents.dimension == 2:
             figures["formation"] = plot_formation(agents_run).figure
     return figures
 
 
 def run_of_agents(saved: Certificate) -> AgentsTrajectory | None:
     """Return a run of a few agents of order n; None of others, and where it fails."""
-    if saved.agents is None or saved.agents.initial_state is None or saved.graph.n_nodes > _RUN:
+    if saved.proof.agents is None or saved.proof.agents.initial_state is None or saved.graph_proof.graph.n_nodes > _RUN:
         return None
     try:
-        return saved.agents.simulate()
+        return saved.proof.agents.simulate()
     except (SimulationError, ParameterError):
         return None
 
@@ -139,12 +141,13 @@ def _draw_family(
     saved: Certificate, wanted: Sequence[str], runs: Sequence[Trajectory], why: Counterexamples
 ) -> dict[str, Any]:
     """Draw the graphs, runs within what is proved, and counterexamples: as far as there are any."""
-    small = bool(runs) and saved.family.n_nodes <= INPUT_NODES
-    there = {"graph": saved.family.n_nodes <= DRAWN_NODES, "states": small, "input": small}
-    moves = bool(runs) and saved.common and saved.rate is not None
-    there["decay"] = moves and bool(saved.deviation_bound([1.0]).max() > 0)
-    there["late"] = saved.late is not None and bool(saved.late.rows)
-    there["tracking"] = saved.tracking is not None
+    proof = saved.family_proof
+    small = bool(runs) and proof.family.n_nodes <= INPUT_NODES
+    there = {"graph": proof.family.n_nodes <= DRAWN_NODES, "states": small, "input": small}
+    moves = bool(runs) and proof.common and proof.rate is not None
+    there["decay"] = moves and bool(proof.deviation_bound([1.0]).max() > 0)
+    there["late"] = proof.late is not None and bool(proof.late.rows)
+    there["tracking"] = proof.tracking is not None
     taken = ("states", "input", "decay")
     figures = {
         name: PLOTS[name](saved, **({"runs": runs} if name in taken else {})).figure
@@ -162,14 +165,14 @@ def _draw_family(
 def counterexamples(saved: Certificate) -> Counterexamples:
     """Return what is refuted, the counterexample in words, its component, and itself: for claim and expectation."""
     result = []
-    for part in saved.parts:
+    for part in saved.family_proof.parts:
         component = part.component
         if component.behaviour == DEPENDS and component.counterexample is not None:
             result.append(("one behaviour for every signal", component, component.counterexample))
             break
     asked = saved.expectations.behaviour
     if asked is not None and any(a.status == REFUTED for a in saved.assessment.answers):
-        for part in saved.parts:
+        for part in saved.family_proof.parts:
             if component_holds(part.component, asked) is False:
                 why = component_refutation(part.component, asked)
                 if why is not None and why not in [one for _, _, one in result]:

@@ -268,8 +268,8 @@ def parameter_names(protocol: Protocol) -> list[str]:
 
 def agent_parts(saved: Certificate) -> list[str]:
     """Say of every agent which part of the graph it is in."""
-    parts = ["follower"] * saved.graph.n_nodes
-    groups = saved.structure.closed_components
+    parts = ["follower"] * saved.graph_proof.graph.n_nodes
+    groups = saved.graph_proof.structure.closed_components
     for k, component in enumerate(groups, start=1):
         name = f"leader of group {k}" if len(groups) > 1 else "leader"
         for v, sign in zip(component.nodes, component.gauge or [0] * len(component.nodes), strict=True):
@@ -288,7 +288,7 @@ def state_columns(
 
     The last head is for what an undecided certificate says of the final state; ``written`` writes a proved interval.
     """
-    x0, sigma0, end = saved.initial_positions or (), saved.sigma0 or (), saved.final_positions
+    x0, sigma0, end = saved.proof.initial_positions or (), saved.sigma0 or (), saved.graph_proof.final_positions
     columns = {heads[0]: [rational(x0[k]) for k in agents]}
     if not saved.direct:
         columns[heads[1]] = [rational(sigma0[k]) for k in agents]

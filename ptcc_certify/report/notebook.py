@@ -63,10 +63,10 @@ def certificate_html(certificate: Certificate) -> str:
     Of one that was read, up to 120 nodes, the run is made for the figure; of a family that is a drawing of it.
     """
     if certificate.of_family:
-        return _page(facts_of(certificate), *_family_figure(certificate.family))
-    part, facts = certificate.agents, facts_of(certificate, "signed digraph", {})
+        return _page(facts_of(certificate), *_family_figure(certificate.family_proof.family))
+    part, facts = certificate.proof.agents, facts_of(certificate, "signed digraph", {})
     if part is not None:
-        drawn = part.initial_state is not None and certificate.graph.n_nodes <= SHOWN_NODES
+        drawn = part.initial_state is not None and certificate.graph_proof.graph.n_nodes <= SHOWN_NODES
         alt = "positions, velocities and so on over time"
         return _page(facts, plot_motion(certificate) if drawn else None, alt)
     if figures := draw(certificate, ["late", "tracking"]):
@@ -79,7 +79,7 @@ def certificate_html(certificate: Certificate) -> str:
 def _with_run(certificate: Certificate) -> Certificate:
     """Return a small certificate that was read with a run, which its file does not hold."""
     made = certificate.source is None or certificate.trajectory is not None
-    if not (made or certificate.initial_state is None or certificate.graph.n_nodes > SHOWN_NODES):
+    if not (made or certificate.initial_state is None or certificate.graph_proof.graph.n_nodes > SHOWN_NODES):
         with suppress(PTCCError):
             return certificate.with_simulation(samples=201)
     return certificate

@@ -176,15 +176,15 @@ def _view(saved: Certificate) -> dict[str, Any]:
     answers, details = ([fact for fact in shown if fact.detail == wanted] for wanted in (False, True))
     asked = [fact for fact in facts if fact.head in _QUESTION]
     if not saved.of_family:
-        asked += leader_facts(saved.structure)
-    pairs = zip(saved.labels, saved.sigma0 or (), saved.reaching or (), strict=False)
+        asked += leader_facts(saved.graph_proof.structure)
+    pairs = zip(saved.labels, saved.sigma0 or (), saved.proof.reaching or (), strict=False)
     advised = next((piece.number for piece in assessment.advice if isinstance(piece, Change)), "")
-    begins = saved.initial_state if saved.agents is None else saved.agents.initial_state
+    begins = saved.initial_state if saved.proof.agents is None else saved.proof.agents.initial_state
     certified = saved.verdict == "certified"
     lacks = [
         text
         for text, lacking in {
-            "no decay was proved": saved.rate is None and not saved.constant,
+            "no decay was proved": saved.proof.rate is None and not saved.proof.constant,
             "no final state was proved": source is not None and source.document.get("influence", 0) is None,
         }.items()
         if lacking
@@ -207,22 +207,23 @@ def _view(saved: Certificate) -> dict[str, Any]:
         "file_name": None if source is None else source.path.name,
         "sha256": None if source is None else source.sha256,
         "document": None if source is None else source.document,
-        **{"constant": saved.constant, "theorem": THEOREM},
+        **{"constant": saved.proof.constant, "theorem": THEOREM},
     }
 
 
 def protocol_latex(saved: Certificate) -> str:
     """Return the protocol in LaTeX: that of agents of order n, or with places in a formation."""
-    if saved.agents is not None:
-        return saved.agents.protocol.latex()
-    if saved.late is not None and (tracking := saved.late.tracking_protocol) is not None:
+    if saved.proof.agents is not None:
+        return saved.proof.agents.protocol.latex()
+    if saved.proof.late is not None and (tracking := saved.proof.late.tracking_protocol) is not None:
         return tracking.latex()
-    return saved.protocol.latex(places=saved.offsets is not None)
+    return saved.protocol.latex(places=saved.proof.offsets is not None)
 
 
 def _of_graph(saved: Certificate) -> dict[str, Any]:
     """Return what the template shows of one graph alone."""
-    claims = sorted(Counter(saved.claims).items(), key=lambda item: item[0].theorem)
+    proof = saved.graph_proof
+    claims = sorted(Counter(proof.claims).items(), key=lambda item: item[0].theorem)
     statements = {theorem.number: theorem.statement for theorem in THEOREMS}
     rows = []
     for claim, number in claims:
@@ -231,35 +232,36 @@ def _of_graph(saved: Certificate) -> dict[str, Any]:
             f" ({'Corollary' if len(claim.corollaries) == 1 else 'Corollaries'} {', '.join(claim.corollaries)})"
         )
         source = f"Theorem {claim.theorem}{corollaries if claim.corollaries else ''}"
-        rows.append((words, source, statements[claim.theorem] if saved.agents is None else "", number))
+        rows.append((words, source, statements[claim.theorem] if proof.agents is None else "", number))
     title = _title(saved)
     return {
         **{"family": None, "several": False, "depends": False, "promise": "", "promised": False, "of_the_kind": False},
-        **{"claims": rows, "claims_in_all": len(saved.claims), "bound_words": []},
+        **{"claims": rows, "claims_in_all": len(proof.claims), "bound_words": []},
         "theorems": list(dict.fromkeys(claim.theorem for claim, _ in claims)),
         **{"heading": texts.indexed(title), "title": title.replace("<sup>", "^").striptags()},
-        "unbounded": saved.effort is not None and saved.effort.bounded is False and saved.agents is None,
+        "unbounded": proof.effort is not None and proof.effort.bounded is False and proof.agents is None,
     }
 
 
 def _title(saved: Certificate) -> Markup:
     """Say what the certificate is about."""
-    claims, deadline = saved.claims, "T" if saved.protocol.reaching is None else "T_r + T_s"
+    claims, deadline = saved.graph_proof.claims, "T" if saved.protocol.reaching is None else "T_r + T_s"
     behaviour = claims[0].sharpest if len(claims) == 1 else f"{len(claims):,} components settle"
     text = Markup("{} at {} = {}").format(behaviour, deadline, rational(saved.protocol.T)).replace("= \u2248", "\u2248")
-    if saved.agents is not None:
-        text = Markup("{} of {}").format(behaviour, plant_text(saved.agents.protocol.plant))
-    elif saved.constant:
+    if saved.proof.agents is not None:
+        text = Markup("{} of {}").format(behaviour, plant_text(saved.proof.agents.protocol.plant))
+    elif saved.proof.constant:
         text = Markup("every agent keeps {}").format("its state" if saved.direct else "x \u2212 \u03c3")
-    if saved.agents is None:
-        text += "" if saved.offsets is None else " of x \N{MINUS SIGN} offsets"
+    if saved.proof.agents is None:
+        text += "" if saved.proof.offsets is None else " of x \N{MINUS SIGN} offsets"
         text += "".join(f", {assumption}" for assumption in assumptions(saved) if assumption != "without limits")
     return text[:1].upper() + text[1:] if saved.verdict == "certified" else "Undecided: " + text
 
 
 def _of_family(saved: Certificate, why: Counterexamples) -> dict[str, Any]:
     """Return what the template shows of a family alone."""
-    components = [part.component for part in saved.parts]
+    proof = saved.family_proof
+    components = [part.component for part in proof.parts]
     depends, T = any(component.behaviour == DEPENDS for component in components), rational(saved.protocol.T)
     counts = Counter(claim.value for claim in facts_of(saved, details=False) if claim.head == "claim" and claim.value)
     behaviour = next(iter(counts)) if len(counts) == 1 else f"{len(components):,} components settle"
@@ -270,16 +272,21 @@ def _of_family(saved: Certificate, why: Counterexamples) -> dict[str, Any]:
         title = Markup("what the agents do at T = {}").format(T)
     title = title.replace("= \u2248", "\u2248")
     title = title[:1].upper() + title[1:] if saved.verdict == "certified" else "Undecided: " + title
-    bound = min((p.upper_bound for p in saved.parts if p.upper_bound), key=lambda b: b.value, default=None)
+    bound = min((p.upper_bound for p in proof.parts if p.upper_bound), key=lambda b: b.value, default=None)
     claims = [(str(claim)[:1].upper() + str(claim)[1:], "", "", number) for claim, number in counts.items()]
     return {
-        **{"family": saved.family, "several": len(saved.family.modes) > 1, "depends": depends, "why": why},
+        **{
+            "family": proof.family,
+            "several": len(proof.family.modes) > 1,
+            "depends": depends,
+            "why": why,
+        },
         **{"claims": claims, "claims_in_all": len(components), "heading": title, "title": title.striptags()},
-        "promise": "" if saved.signal == "any" else signal_text(saved.signal)[1],
+        "promise": "" if proof.signal == "any" else signal_text(proof.signal)[1],
         "promised": nearer_for_signal(saved.family_proof) if saved.initial_state is not None else False,
         "bound_words": _bound_words(saved),
         "bound_kind": "" if bound is None else BOUND_KINDS[bound.kind],
-        "unbounded": saved.unbounded and saved.common,
+        "unbounded": proof.unbounded and proof.common,
         "theorems": [],
     }
 
@@ -291,7 +298,7 @@ def _runs(saved: Certificate, runs: Sequence[Trajectory], run: AgentsTrajectory 
         if not runs:
             return view | {"run_text": ""}
         ratios = [compare(saved, run) for run in runs]
-        promise_kept = saved.signal != "any" and keeps_promise(saved, runs)
+        promise_kept = saved.family_proof.signal != "any" and keeps_promise(saved, runs)
         worst = sum(run.signal.startswith("worst") for run in runs)
         text = f"{counted(len(runs), 'run')} from the initial state of the certificate"
         text += (
@@ -300,13 +307,13 @@ def _runs(saved: Certificate, runs: Sequence[Trajectory], run: AgentsTrajectory 
             else f", {worst} of them under the worst that was found"
         )
         text += "." if saved.direct else ", under the worst disturbance."
-        if any(ratio.judged for ratio in ratios) and saved.common:
+        if any(ratio.judged for ratio in ratios) and saved.family_proof.common:
             largest = max(ratio.worst_ratio for ratio in ratios)
             word = "VIOLATED" if any(ratio.violated for ratio in ratios) else "kept"
             text += f" The bounds are {word}: the largest ratio of run to bound is {largest:.3g}."
         return view | {"run_text": text, "of_the_kind": promise_kept}
-    if saved.agents is not None:
-        seen = None if run is None else saved.agents.compare(run)
+    if saved.proof.agents is not None:
+        seen = None if run is None else saved.proof.agents.compare(run)
         if seen is None:
             return view | {"run_text": ""}
         word = "exceeds a bound" if seen.violated else "keeps every bound"
@@ -336,11 +343,11 @@ def _obligations(report: CheckReport) -> list[tuple[VerifiedObligation, list[Ver
 
 def _bound_words(saved: Certificate) -> list[Markup]:
     """Tell the members that prove the upper bound on the rate: modes, weights, durations or shares."""
-    parts = [part for part in saved.parts if part.upper_bound is not None]
+    parts = [part for part in saved.family_proof.parts if part.upper_bound is not None]
     if not parts:
         return []
     part = min(parts, key=lambda p: p.upper_bound.value)  # type: ignore[union-attr]
-    bound, family = part.upper_bound, saved.family
+    bound, family = part.upper_bound, saved.family_proof.family
     assert bound is not None
     from ptcc_certify.certificate.unverified import upper_bound_entry
     from ptcc_certify.lyapunov.quotient import Quotient

@@ -142,7 +142,7 @@ def _with_runs(saved: Certificate, simulation: bool | None) -> tuple[Certificate
         return saved, [], "it was left out, as was asked"
     if saved.initial_state is None:
         return saved, [], "the certificate names no initial state"
-    if of_family and (saved.late is not None or saved.leaders_move):
+    if of_family and (saved.proof.late is not None or saved.proof.leaders_move):
         return saved, [], "with late messages or leaders that move none is made of a family"
     if simulation is None and n > most:
         return saved, [], f"above {most} agents it is {made} only where that is asked for"

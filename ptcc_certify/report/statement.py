@@ -97,16 +97,16 @@ def report_latex(saved: Certificate, figures: dict[str, str] | None = None) -> s
     names = texts.parameter_names(saved.protocol)
     own = _of_family(saved) if saved.of_family else _of_graph(saved)
     told = [fact for fact in facts_of(saved) if fact.head not in _ELSEWHERE and not isinstance(fact.value, dict)]
-    if saved.agents is not None:  # the rate of the graph alone, with which single integrators would decay
+    if saved.proof.agents is not None:  # the rate of the graph alone, with which single integrators would decay
         told = [fact for fact in told if fact.head != "rate"]
     view = {
         **{"saved": saved, "certified": saved.verdict == "certified", "sliding": saved.protocol.reaching is not None},
-        **{"n": len(saved.labels), "named": _named(saved.labels), "part": saved.agents},
+        **{"n": len(saved.labels), "named": _named(saved.labels), "part": saved.proof.agents},
         "protocol": protocol_latex(saved),
         "parameters": [(Markup(symbol_latex(name)), getattr(saved.protocol, name)) for name in names],
         "proved": [fact for fact in told if fact.standing == "proved"],
         "unproved": [fact for fact in told if fact.standing == "unproved"],
-        "begins": saved.initial_positions is not None,
+        "begins": saved.proof.initial_positions is not None,
         "comment": _comment(saved.source.path.name),
         **{"figures": figures or {}, "stem": _stem(saved.source.path.stem), "captions": _captions(saved)},
         **{"report": saved.source.report, "arithmetic": arithmetic(saved.direct), "theorem": THEOREM},
@@ -117,27 +117,33 @@ def report_latex(saved: Certificate, figures: dict[str, str] | None = None) -> s
 
 def _of_graph(saved: Certificate) -> dict[str, Any]:
     """Return what the template shows of one graph alone."""
-    matrix, small = _matrix(saved.graph)
+    proof = saved.graph_proof
+    matrix, small = _matrix(proof.graph)
     columns, rows = _states(saved)
     heads = ["Part", *columns] if columns else []
     (structure,) = (fact for fact in facts_of(saved) if fact.head == "structure")
-    claims = sorted(Counter(saved.claims).items(), key=lambda item: item[0].theorem)
+    claims = sorted(Counter(proof.claims).items(), key=lambda item: item[0].theorem)
     return {
         **{"family": None, "several": False, "depends": False, "matrix": matrix, "small": small},
-        "modes": [] if matrix else _modes(Family.from_graph(saved.graph)),
-        "n_edges": saved.graph.n_edges,
-        "negative": int((saved.graph.sign < 0).sum()),
+        "modes": [] if matrix else _modes(Family.from_graph(proof.graph)),
+        "n_edges": proof.graph.n_edges,
+        "negative": int((proof.graph.sign < 0).sum()),
         "structure": structure,
         "claims": [(claim.behaviour, claim.special[-1:], claim.theorem, number) for claim, number in claims],
-        **{"claims_in_all": len(saved.claims), "assumed": assumptions(saved), "offsets": saved.offsets},
-        "plant": "" if saved.agents is None else plant_text(saved.agents.protocol.plant),
+        **{
+            "claims_in_all": len(proof.claims),
+            "assumed": assumptions(saved),
+            "offsets": proof.offsets,
+        },
+        "plant": "" if proof.agents is None else plant_text(proof.agents.protocol.plant),
         **{"bounds": _bounds(saved), "heads": heads, "rows": rows, "windows": ""},
     }
 
 
 def _of_family(saved: Certificate) -> dict[str, Any]:
     """Return what the template shows of a family alone."""
-    family, components = saved.family, [part.component for part in saved.parts]
+    proof = saved.family_proof
+    family, components = proof.family, [part.component for part in proof.parts]
     parameters = [(mode, mode.parameters) for mode in family.modes]  # both directions of an undirected edge are one
     claims = Counter(map(sharpest, components))
     heads, rows = _family_states(saved)
@@ -150,17 +156,17 @@ def _of_family(saved: Certificate) -> dict[str, Any]:
         "depends": DEPENDS in claims,
         "claims": [(behaviour, (), "", number) for behaviour, number in claims.items()],
         **{"claims_in_all": len(components), "assumed": assumptions(saved), "offsets": None, "plant": "", "bounds": []},
-        "promise": "" if saved.signal == "any" else signal_text(saved.signal)[1],
+        "promise": "" if proof.signal == "any" else signal_text(proof.signal)[1],
         **{"heads": heads, "rows": rows, "windows": _left_by_windows(saved)},
     }
 
 
 def _left_by_windows(saved: Certificate) -> str:
     """Return what joint windows leave less and less of, in symbols; nothing where no such claim is made."""
-    claims = [claim for claim in saved.restricted if isinstance(claim, WindowClaim)]
+    claims = [claim for claim in saved.family_proof.restricted if isinstance(claim, WindowClaim)]
     sizes = {STABILITY: r"$\max_{k} |x_{k}(t)|$"}
     spread = r"$\max_{k} g_{k} x_{k}(t) - \min_{k} g_{k} x_{k}(t)$, where $g_{k} = \pm 1$ is the camp of agent $k$"
-    within = " over the agents of a component" if len(saved.parts) > 1 else ""
+    within = " over the agents of a component" if len(saved.family_proof.parts) > 1 else ""
     return "; or ".join(dict.fromkeys(sizes.get(claim.behaviour, spread) + within for claim in claims))
 
 
@@ -176,9 +182,9 @@ def _captions(saved: Certificate) -> dict[str, str]:
         graph = "The signed digraph: arrows point to who listens, solid from allies, dashed from opponents."
         return {"graph": graph, "decay": decay}
     graph = "The graphs: arrows point to who listens, solid from allies, dashed from opponents."
-    if any(mode.parameters.size for mode in saved.family.modes):
+    if any(mode.parameters.size for mode in saved.family_proof.family.modes):
         graph += " A pale band is as wide as the largest weight, the line on it as the least."
-    if any(mode.optional.any() for mode in saved.family.modes):
+    if any(mode.optional.any() for mode in saved.family_proof.family.modes):
         graph += " Dotted ones may fail."
     decay = "How far agents are from their final states, against the time left, both logarithmic. Thick line: the"
     decay += f" {bound} for every signal. Thin: simulated runs (numerical), {_DOWN_TO}"
@@ -245,7 +251,7 @@ def _width(number: str) -> float:
 
 def _bounds(saved: Certificate) -> list[tuple[Fraction, Fraction]]:
     """Return overshoot constant and rate of the functions whose least bound holds; none that another one beats."""
-    own = [m for m in saved.envelope.functions if m.coordinates == saved.envelope.coordinates]
+    own = [m for m in saved.graph_proof.envelope.functions if m.coordinates == saved.graph_proof.envelope.coordinates]
     bounds: list[tuple[Fraction, Fraction]] = []
     for c, rate in sorted((m.overshoot, m.proved_rate) for m in own):
         if bounds and bounds[-1][0] == c:
@@ -257,11 +263,13 @@ def _bounds(saved: Certificate) -> list[tuple[Fraction, Fraction]]:
 
 def _states(saved: Certificate) -> tuple[list[str], list[tuple[str, ...]]]:
     """Return heads and rows of the table of places in a formation, and of initial and final states."""
-    if (saved.initial_state is None and saved.offsets is None) or saved.agents is not None:
+    if (saved.initial_state is None and saved.proof.offsets is None) or saved.proof.agents is not None:
         return [], []
     heads = ("$x_{k}(0)$", r"$\sigma_{k}(0)$", "at the deadline", "limit, if it settles")
-    agents = range(min(saved.graph.n_nodes, texts.LISTED))
-    numbers = {} if saved.offsets is None else {"$h_{k}$": [texts.rational(saved.offsets[k]) for k in agents]}
+    agents = range(min(saved.graph_proof.graph.n_nodes, texts.LISTED))
+    numbers = (
+        {} if saved.proof.offsets is None else {"$h_{k}$": [texts.rational(saved.proof.offsets[k]) for k in agents]}
+    )
     if saved.initial_state is not None:
         numbers |= texts.state_columns(
             saved, heads, agents, lambda x: texts.enclosed(x) if x[1] else texts.rational(x[0])
@@ -282,7 +290,7 @@ def _family_states(saved: Certificate) -> tuple[list[str], list[tuple[str, ...]]
     if not saved.direct:
         columns[r"$\sigma_{k}(0)$"] = _in_math(map(texts.rational, (saved.sigma0 or ())[: texts.LISTED]))
     if any(end is not None for end in ends):
-        restricted = states_of_signal(saved.family_proof) != list(saved.final_state or ())
+        restricted = states_of_signal(saved.family_proof) != list(saved.proof.final_state or ())
         head = "at the deadline, restricted" if restricted else "at the deadline"
         columns[head] = ["no limit claimed" if end is None else _in_math([end])[0] for end in ends]
     return list(columns), list(zip(map(latex_of_text, map(_cut, labels)), *columns.values(), strict=True))

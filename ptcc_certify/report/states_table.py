@@ -26,12 +26,12 @@ def states_table(saved: Certificate) -> tuple[str, list[Any], list[str]]:
     """Return caption, rows and heads of the table of initial and final states: of all agents, or of the extremes."""
     if saved.of_family:
         return _of_family(saved)
-    columns = _of_agents(saved) if saved.agents is not None else _of_graph(saved)
+    columns = _of_agents(saved) if saved.proof.agents is not None else _of_graph(saved)
     if not columns:
         return "", [], []
-    agents, end, ends = _tabled(saved), saved.final_state, f"Where the agents end{_assumed(saved)}"
+    agents, end, ends = _tabled(saved), saved.graph_proof.final_state, f"Where the agents end{_assumed(saved)}"
     exact = end is None or end.radius is None
-    if saved.agents is not None:
+    if saved.proof.agents is not None:
         caption = "Where the agents begin and end, and their inputs"
     elif end is None:
         caption = "Where the agents begin"
@@ -39,8 +39,8 @@ def states_table(saved: Certificate) -> tuple[str, list[Any], list[str]]:
         caption = f"{ends}, proved {'exactly' if exact else 'in intervals'}"
     else:
         caption = f"{ends} if they settle ({'exact' if exact else 'in proved intervals'})"
-    if saved.graph.n_nodes > ROWS:
-        total = counted(saved.graph.n_nodes, "agent")
+    if saved.graph_proof.graph.n_nodes > ROWS:
+        total = counted(saved.graph_proof.graph.n_nodes, "agent")
         caption += f": the {EXTREMES} highest and the {EXTREMES} lowest of {total}"
     names = [texts.label(saved.labels[k]) for k in agents]
     return caption, list(zip(names, *columns.values(), strict=True)), ["Agent", *columns]
@@ -53,12 +53,13 @@ def _assumed(saved: Certificate) -> str:
 
 def _tabled(saved: Certificate) -> list[int]:
     """Return the agents that have a row: all, or those that end highest and lowest, from the highest on."""
-    if saved.graph.n_nodes <= ROWS:
-        return list(range(saved.graph.n_nodes))
-    if saved.agents is not None:
+    proof = saved.graph_proof
+    if proof.graph.n_nodes <= ROWS:
+        return list(range(proof.graph.n_nodes))
+    if proof.agents is not None:
         return list(range(2 * EXTREMES))
-    if (end := saved.final_positions) is None:
-        highest, lowest = extremes(saved.initial_positions or (), EXTREMES)
+    if (end := proof.final_positions) is None:
+        highest, lowest = extremes(proof.initial_positions or (), EXTREMES)
     else:
         highest, lowest = extremes(end.states, EXTREMES, end.radius)
     return highest + lowest
@@ -70,14 +71,14 @@ def _of_graph(saved: Certificate) -> dict[str, list[Any]]:
     heads = ("Initial state", "\u03c3(0)", "State at the deadline", "Limit, if it settles")
     agents, parts = _tabled(saved), texts.agent_parts(saved)
     columns: dict[str, list[Any]] = {"Part": [parts[k] for k in agents]}
-    if saved.offsets is not None:
-        columns["Place h"] = [rational(saved.offsets[k]) for k in agents]
+    if saved.proof.offsets is not None:
+        columns["Place h"] = [rational(saved.proof.offsets[k]) for k in agents]
     return columns | texts.state_columns(saved, heads, agents, enclosed)
 
 
 def _of_agents(saved: Certificate) -> dict[str, list[Any]]:
     """Return initial and final positions, velocities and so on, and bounds of inputs, of agents of order n."""
-    part, agents = saved.agents, _tabled(saved)
+    part, agents = saved.proof.agents, _tabled(saved)
     assert part is not None
     letters = ["x", "v", "a", *(f"x^({i})" for i in range(3, part.order))][: part.order]
     columns: dict[str, list[Any]] = {}
@@ -103,7 +104,7 @@ def _of_family(saved: Certificate) -> tuple[str, list[Any], list[str]]:
     heads = ["Agent", "Camp", "Initial state"]
     if all(last is None for *_, last in rows):
         return "Where the agents begin", [(texts.label(name), *cells) for name, *cells, _ in rows], heads
-    every = finals == list(saved.final_state or ())
+    every = finals == list(saved.proof.final_state or ())
     which = "every signal" if every else "these signals"
     which += "" if saved.protocol.reaching is None else " and disturbance"
     last = "State at the deadline" if rests(saved) else "State at any instant"
@@ -116,9 +117,9 @@ def state_rows(saved: Certificate) -> list[tuple[str, str, str, str | None]]:
     """Return label, camp, initial and final state of every agent; None where no limit is claimed."""
     if saved.initial_state is None:
         return []
-    labels, finals = saved.family.labels, states_of_signal(saved.family_proof)
+    labels, finals = saved.family_proof.family.labels, states_of_signal(saved.family_proof)
     camp = ["\u2013"] * len(labels)
-    for part in saved.parts:
+    for part in saved.family_proof.parts:
         for number, side in enumerate(camps(part.component), 1):
             for v in part.component.nodes[side].tolist():
                 camp[v] = f"camp {number}"

@@ -33,10 +33,12 @@ def rows_of(certificate: Certificate, compared: bool) -> dict[str, str]:
     -------
     dict of str to str
     """
-    decays = certificate.rate is not None and not certificate.constant
+    decays = certificate.proof.rate is not None and not certificate.proof.constant
     inputs = list(input_facts(certificate, details=False))
     loud = any(fact.loud for fact in inputs)
-    sliding = sliding_facts(certificate.labels, certificate.protocol.reaching, certificate.sigma0, certificate.reaching)
+    sliding = sliding_facts(
+        certificate.labels, certificate.protocol.reaching, certificate.sigma0, certificate.proof.reaching
+    )
     facts = {
         "claim": claim_facts(certificate),
         "x(T)": islice(final_facts(certificate), 1),

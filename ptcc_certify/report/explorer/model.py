@@ -268,7 +268,7 @@ class Explorer:
             initial_state=tuple(x0),
             sigma0=None if sigma0 is None else tuple(sigma0),
             reaching=reaching,
-            final_state=final_state(base.structure, first, matrix=base.influence),
+            final_state=final_state(base.graph_proof.structure, first, matrix=base.graph_proof.influence),
             trajectory=run,
             notes=(),
         )

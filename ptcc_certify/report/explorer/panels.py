@@ -49,7 +49,7 @@ def shown_in(certificate: Certificate, name: str) -> Any:
     if name != "sliding" or run is None or run.sliding is None:
         return None
     moved = tuple(part.tobytes() for part in (run.t, run.sliding.sigma, run.sliding.reaching_times))
-    return moved, run.sliding.protocol.T_r, certificate.reaching
+    return moved, run.sliding.protocol.T_r, certificate.proof.reaching
 
 
 def draw_panels(certificate: Certificate, names: tuple[str, ...]) -> Figure:
@@ -103,12 +103,12 @@ def _draw_decay(certificate: Certificate, ax: Axes) -> None:
 
     These, typeset powers of ten and minor ticks would take longer to draw than all the rest; the axes are fixed.
     """
-    run, envelope = certificate.trajectory, certificate.envelope
-    if run is None or not envelope.functions or certificate.constant:
-        raise ValueError("there is nothing to decay" if certificate.constant else "no bound is proved")
+    run, envelope = certificate.trajectory, certificate.graph_proof.envelope
+    if run is None or not envelope.functions or certificate.proof.constant:
+        raise ValueError("there is nothing to decay" if certificate.proof.constant else "no bound is proved")
     before = run.remaining > 0
     norm, floor, unit = error_norm(run, certificate)
-    bound = certificate.norm_bound(run.remaining[before]) / unit
+    bound = certificate.graph_proof.norm_bound(run.remaining[before]) / unit
     scale = float(norm[0]) or 1.0
     ax.loglog(run.remaining[before], bound / scale, color=BOUND, linewidth=1.6, label="proved bound")
     ax.loglog(run.remaining[before], resolved(norm, bound, floor) / scale, color=RUN, label="simulated (CVODES)")

@@ -48,14 +48,14 @@ WHATEVER = {"any": "for every signal", "constant": "if mode and weights never ch
 
 def assumptions(certificate: Certificate) -> list[str]:
     """Tell what claim, final state, rate and error are without, where more was asked."""
-    messages = None if certificate.late is None else certificate.late.messages
+    messages = None if certificate.proof.late is None else certificate.proof.late.messages
     virtual = messages is not None and messages.vehicles is not None
     assumed = {
         "without limits": bool(certificate.limits),
         "of virtual positions": virtual,
         "without a gain cap": messages is not None and virtual and messages.gain_cap is not None,
         "nothing late": messages is not None and not (virtual and messages.exact),
-        "leaders at rest": certificate.leaders_move,
+        "leaders at rest": certificate.proof.leaders_move,
     }
     return [text for text, holds in assumed.items() if holds]
 
@@ -68,11 +68,11 @@ def claim_facts(certificate: Certificate) -> Facts:
     if p.reaching is not None and not also:
         also = f", any |d_k| <= {down(p.reaching.delta, 12)}" if p.reaching.delta else ", without disturbances"
     when = f" at T = {near(p.T)}"
-    if certificate.agents is not None:
-        when = f"{claimed_of(certificate.agents)}{when}"
-    elif certificate.offsets is not None:
+    if certificate.proof.agents is not None:
+        when = f"{claimed_of(certificate.proof.agents)}{when}"
+    elif certificate.proof.offsets is not None:
         when = f" of x - offsets{when}"
-    yield from structure_claims(certificate.structure, certificate.claims, when, also)
+    yield from structure_claims(certificate.graph_proof.structure, certificate.graph_proof.claims, when, also)
 
 
 def structure_claims(structure: Structure, claims: Sequence[Claim], when: str = "", also: str = "") -> Facts:
@@ -130,7 +130,7 @@ def family_claims(
 ) -> Facts:
     """Tell what every component does; where that depends on the signal, why, and what holds all the same."""
     disturbed = certificate is not None and certificate.sigma0 is not None
-    direct, boxes = (True, {}) if certificate is None else (certificate.direct, certificate.boxes)
+    direct, boxes = (True, {}) if certificate is None else (certificate.direct, certificate.family_proof.boxes)
     also = " and disturbance" if disturbed else ""
     also += "" if certificate is None else "".join(f", {text}" for text in assumptions(certificate))
     order = sorted(range(len(components)), key=lambda k: -components[k].nodes.size)
@@ -269,9 +269,9 @@ def _agreeing(component: FamilyComponent, groups: Sequence[AgreeingGroup]) -> li
 
 def told_ranges(certificate: Certificate) -> dict[int, tuple[Interval, ...]]:
     """Return between which ends every signal keeps agents, of components of which no last mode tells the same."""
-    last = certificate.ends_of_signal
+    last = certificate.family_proof.ends_of_signal
     same = {k for k, claim in last.items() if isinstance(claim, LastModeClaim) and claim.final_states is not None}
-    return {k: ends for k, ends in certificate.ranges.items() if k not in same}
+    return {k: ends for k, ends in certificate.family_proof.ranges.items() if k not in same}
 
 
 def range_text(component: FamilyComponent, ends: Sequence[Interval], width: int = 12 * TEXT) -> str:

@@ -40,29 +40,34 @@ BOUND_KINDS = {
 
 def rate_facts(certificate: Certificate) -> Facts:
     """Tell the rate and its upper bound, and the Lyapunov functions: class, rate, overshoot, what was searched."""
-    rate, bound, spectral = certificate.rate, certificate.upper_bound, certificate.spectral_rate
-    if certificate.constant:
+    proof = certificate.graph_proof
+    rate, bound, spectral = proof.rate, proof.upper_bound, certificate.observed.spectral_rate
+    if proof.constant:
         return
     limit = "" if bound is None else f"upper bound {up(bound, 8)}, proved"
     if bound is not None and spectral is not None and bound > Fraction(spectral) * Fraction(101, 100):
         limit += f" ({spectral:.6g}, numerical)"
     if rate is None:
-        numerical = "" if certificate.numerical_rate is None else f"numerically {certificate.numerical_rate:.6g}"
+        numerical = (
+            ""
+            if certificate.observed.numerical_rate is None
+            else f"numerically {certificate.observed.numerical_rate:.6g}"
+        )
         note = "; ".join(filter(None, ("not proved", numerical, limit)))
         yield Fact(head="rate", standing="unproved", note=note, detail=True)
         return
     yield Fact(head="rate", value=rate, side="down", note=_rate_text(certificate, rate, limit), detail=True)
-    if certificate.overshoot is not None:
-        kinds = ", ".join(f"{number} {kind}" for kind, number in Counter(V.kind for V in certificate.functions).items())
-        of = certificate.fastest.coordinates
-        text = f"overshoot constant at that rate {up(certificate.overshoot, 4)} of ||{of}||^2; functions: {kinds}"
-        yield Fact(head="function", value=certificate.overshoot, side="up", note=text, detail=True)
-    V, search = certificate.lyapunov, certificate.search
-    if V is not None and certificate.paper_rate is not None:
+    if proof.overshoot is not None:
+        kinds = ", ".join(f"{number} {kind}" for kind, number in Counter(V.kind for V in proof.functions).items())
+        of = proof.fastest.coordinates
+        text = f"overshoot constant at that rate {up(proof.overshoot, 4)} of ||{of}||^2; functions: {kinds}"
+        yield Fact(head="function", value=proof.overshoot, side="up", note=text, detail=True)
+    V, search = proof.lyapunov, certificate.search
+    if V is not None and proof.paper_rate is not None:
         rho = "" if V.rho is None else f", rho {float(V.rho):.4g}"
         overshoot = f"overshoot constant {up(V.overshoot, 4)} of ||{V.coordinates}||^2"
-        text = f"paper {down(certificate.paper_rate)} = {V.objective}{rho}; {overshoot}"
-        yield Fact(head="function", value=certificate.paper_rate, side="down", note=text, detail=True)
+        text = f"paper {down(proof.paper_rate)} = {V.objective}{rho}; {overshoot}"
+        yield Fact(head="function", value=proof.paper_rate, side="down", note=text, detail=True)
     if search.searched:
         searched = [f"{kind} {rate:.4g}" for kind, rate in search.searched.items()]
         limit = "" if search.diagonal_limit is None else f"; diagonal upper bound {search.diagonal_limit:.4g}"
@@ -77,27 +82,28 @@ def _rate_text(certificate: Certificate, rate: Fraction, limit: str) -> str:
     """Tell a proved rate, what decays at it, and its ratio to what limits it."""
     law = "V <= e^(-rate s) V(0)" if certificate.direct else "V <= e^(-rate (s - s(T_r))) V(T_r) from T_r on"
     text = f"{down(rate)} per unit of the stretched clock s, proved: {law}"
-    if certificate.upper_bound is None:
+    if certificate.proof.upper_bound is None:
         return text
-    return f"{text}; {limit}, optimality ratio at least {down(rate / certificate.upper_bound, 4)}"
+    return f"{text}; {limit}, optimality ratio at least {down(rate / certificate.proof.upper_bound, 4)}"
 
 
 def error_facts(certificate: Certificate, drawn: bool, details: bool) -> Facts:
     """Tell how near the agents are to their final states by when; ``drawn`` if the initial state is of no interest."""
-    if certificate.constant:
+    proof = certificate.graph_proof
+    if proof.constant:
         invariant = "its state" if certificate.direct else "x - sigma"
         yield Fact(head="error", note=f"none: no agent listens to another, each keeps {invariant}")
         return
     value, norm, agents, more = _error_texts(certificate)
     if norm:
-        limited = certificate.effort is not None and bool(certificate.effort.residual)  # from the whole set
+        limited = proof.effort is not None and bool(proof.effort.residual)  # from the whole set
         texts = [norm + agents.replace("every agent", whom) + more for whom in ("every agent", "agents", "each")]
         brief = [*(texts if limited or not drawn else []), norm + more]
         standing: Standing = "proved" if limited or certificate.direct else "unproved"
         yield Fact(head="error", value=value, side="up", standing=standing, note=brief[0], brief=tuple(brief))
-    if details and certificate.rate is not None:
+    if details and proof.rate is not None:
         yield from instants_facts(certificate)
-        if certificate.initial_state is not None and not drawn and any(V.deviation for V in certificate.functions):
+        if certificate.initial_state is not None and not drawn and any(V.deviation for V in proof.functions):
             yield from _deviation_facts(certificate)
 
 
@@ -106,28 +112,29 @@ def _error_texts(certificate: Certificate) -> tuple[Fraction | float, str, str, 
 
     The first number, and texts that are empty where nothing is proved; the last one tells that there are more limits.
     """
-    if certificate.effort is not None and certificate.effort.residual:
-        entry, *others = certificate.effort.residual
+    proof = certificate.graph_proof
+    if proof.effort is not None and proof.effort.residual:
+        entry, *others = proof.effort.residual
         noise = "" if entry.noise is None else f", |n_k| <= {down(entry.noise, 12)}"
         size = entry.noisy_norm or entry.norm
         norm = f"{limits_text(entry)}{noise}: ||E|| <= {up(size, 2)} at T"
         agents = "" if entry.agents is None or entry.noisy_norm else f", every agent within {up(max(entry.agents), 2)}"
         return size, norm, agents, f"; ... {len(others) + 1} limits in all" if others else ""
-    if certificate.rate is None or (not certificate.direct and certificate.initial_state is None):
+    if proof.rate is None or (not certificate.direct and certificate.initial_state is None):
         return 0, "", "", ""
     remaining, when = told_instants(certificate.protocol, certificate.direct)[SHORT]
     if certificate.at is not None:
         remaining, when = float(1 - certificate.at / certificate.protocol.T), f"t = {near(certificate.at)}"
-    z = certificate.envelope.coordinates
+    z = proof.envelope.coordinates
     if certificate.direct:
-        value = certificate.envelope.residual(remaining)
+        value = proof.envelope.residual(remaining)
         norm = f"||{z}|| <= {up(value, 2)} ||{z}(0)||"
     else:
-        value = float(certificate.norm_bound([remaining])[0])
+        value = float(proof.norm_bound([remaining])[0])
         norm = f"||{z}|| <= {up(value, 2)}"
     agents = ""
-    if certificate.initial_state is not None and any(V.deviation for V in certificate.functions):
-        agents = f", every agent within {up(float(certificate.deviation_bound([remaining]).max()), 2)}"
+    if certificate.initial_state is not None and any(V.deviation for V in proof.functions):
+        agents = f", every agent within {up(float(proof.deviation_bound([remaining]).max()), 2)}"
     when += "" if certificate.direct else ", numerical"
     return value, f"at {when}: {norm}", agents, ""
 
@@ -139,17 +146,18 @@ def _at_instants(values: Iterable[float], names: Iterable[str]) -> str:
 
 def instants_facts(certificate: Certificate) -> Facts:
     """Tell what the proved rate leaves at instants; of a reaching phase from ``T_r`` on."""
-    p, z, direct = certificate.protocol, certificate.envelope.coordinates, certificate.direct
+    proof = certificate.graph_proof
+    p, z, direct = certificate.protocol, proof.envelope.coordinates, certificate.direct
     instants = told_instants(p, direct)
     if direct:
-        proved = _at_instants((certificate.envelope.residual(q) for q, _ in instants), (name for _, name in instants))
+        proved = _at_instants((proof.envelope.residual(q) for q, _ in instants), (name for _, name in instants))
         yield Fact(head="error", note=f"||{z}(t)|| / ||{z}(0)|| at most {proved}", detail=True)
         slowest = [certificate.best_possible_residual(q) for q, _ in instants]
         if slowest[-1] is not None:
             text = "slowest mode (numerical) " + ", ".join(f"{x or 0.0:.2g}" for x in slowest)
             yield Fact(head="error", standing="unproved", note=text, detail=True)
     else:
-        envelope = certificate.envelope
+        envelope = proof.envelope
         sliding = Envelope(envelope.structure, envelope.gain, envelope.functions)
         left = [q * float(p.T / p.span) for q, _ in instants]
         clocks = [float(p.rho1 * p.span) * (1 - q) - float(p.rho2 * p.kappa) * math.log(q) for q in left]
@@ -158,16 +166,16 @@ def instants_facts(certificate: Certificate) -> Facts:
         yield Fact(head="error", note=f"||{z}(t)|| / ||{z}(T_r)|| at most {proved}", detail=True)
     if not direct and certificate.initial_state is not None:
         instants = [(float(p.span / p.T), "T_r"), *instants]
-        bounds = _at_instants(certificate.norm_bound([q for q, _ in instants]), (name for _, name in instants))
+        bounds = _at_instants(proof.norm_bound([q for q, _ in instants]), (name for _, name in instants))
         text = f"||{z}(t)|| at most {bounds} (numerical, rounded up)"
         yield Fact(head="error", standing="unproved", note=text, detail=True)
 
 
 def _deviation_facts(certificate: Certificate) -> Facts:
     """Tell how far from its final state the farthest agent may be, and every agent at the instant asked for."""
-    yield _deviation_fact(certificate, certificate.deviation_bound)
+    yield _deviation_fact(certificate, certificate.proof.deviation_bound)
     if certificate.at is not None:
-        each = certificate.deviation_bound([float(1 - certificate.at / certificate.protocol.T)])[:, 0]
+        each = certificate.proof.deviation_bound([float(1 - certificate.at / certificate.protocol.T)])[:, 0]
         entries = [f"{labelled(label)} {up(float(x), 2)}" for label, x in zip(certificate.labels, each, strict=True)]
         text = f"at t = {near(certificate.at, 12)}: {shorten_list(entries)}"
         yield Fact(head="deviation", value=each, side="up", note=text, detail=True)
@@ -189,9 +197,11 @@ def _deviation_fact(certificate: Certificate, bound: Callable[[list[float]], np.
 
 def family_rate_facts(certificate: Certificate) -> Facts:
     """Tell the proved rate, its upper bound and their ratio; where no rate was found, the one in closed form."""
-    if not certificate.common or all(part.component.nodes.size == 1 for part in certificate.parts):
+    if not certificate.family_proof.common or all(
+        part.component.nodes.size == 1 for part in certificate.family_proof.parts
+    ):
         return
-    rate, bound = certificate.rate, certificate.upper_bound
+    rate, bound = certificate.proof.rate, certificate.proof.upper_bound
     limit = "" if bound is None else f"upper bound {up(bound)}"
     if rate is not None and certificate.refused:
         text = "none is proved: the independent check does not accept what was found"
@@ -217,7 +227,9 @@ def family_rate_facts(certificate: Certificate) -> Facts:
 
 def explicit_logs(certificate: Certificate) -> list[float]:
     """Return the logarithms of rates in closed form, of every component of several agents; none if one has none."""
-    explicit = [explicit_rate(part.component) for part in certificate.parts if part.component.nodes.size > 1]
+    explicit = [
+        explicit_rate(part.component) for part in certificate.family_proof.parts if part.component.nodes.size > 1
+    ]
     logs = [one.log10_decay_rate for one in explicit if one is not None]
     return logs if len(logs) == len(explicit) else []
 
@@ -226,14 +238,16 @@ def no_search(certificate: Certificate) -> Sentence:
     """Tell why no rate was proved: too many agents for a search, or too little time; nothing where it is not known."""
     from ptcc_certify.lyapunov.family_search import CLOSED_ROWS, TOO_MANY_ROWS
 
-    without = [part.component for part in certificate.parts if part.component.nodes.size > 1 and not part.rate]
+    without = [
+        part.component for part in certificate.family_proof.parts if part.component.nodes.size > 1 and not part.rate
+    ]
     largest = max(without, key=lambda component: component.nodes.size, default=None)
-    late = any("cut off" in note for note in certificate.notes)
+    late = any("cut off" in note for note in certificate.observed.notes)
     if largest is not None and largest.behaviour != STABILITY:
         most = CLOSED_ROWS if largest.behaviour == BIPARTITE_CONSENSUS else EXACT_NODES
         if largest.nodes.size > most:
             return f"{largest.nodes.size:,} agents are above the {most:,} of the searches"
-    if large := next((note for note in certificate.notes if TOO_MANY_ROWS in note), ""):
+    if large := next((note for note in certificate.observed.notes if TOO_MANY_ROWS in note), ""):
         return large
     if largest is not None and largest.nodes.size > EXACT_NODES and not late:
         return f"closed forms of {largest.nodes.size:,} agents prove none"
@@ -242,8 +256,9 @@ def no_search(certificate: Certificate) -> Sentence:
 
 def function_facts(certificate: Certificate) -> Facts:
     """Tell the rate of every Lyapunov function, of every mode, and what proves the upper bound."""
-    for part in certificate.parts:
-        names = [labelled(mode_name(certificate.family, k)) for k in range(len(certificate.family.modes))]
+    proof = certificate.family_proof
+    for part in proof.parts:
+        names = [labelled(mode_name(proof.family, k)) for k in range(len(proof.family.modes))]
         for V in part.functions:
             own = getattr(V, "rates", ()) if len(names) > 1 else ()  # functions of rows have one rate
             rates = ", ".join(f"{name} {down(rate)}" for name, rate in zip(names, own, strict=False))
@@ -267,14 +282,16 @@ def family_error_facts(certificate: Certificate) -> Facts:
 
     if certificate.initial_state is None or certificate.refused:
         return
-    every = certificate.common and certificate.rate is not None
+    every = certificate.family_proof.common and certificate.proof.rate is not None
     if every:
-        yield from _family_error(certificate, certificate.deviation_bound, every_text(certificate))
+        yield from _family_error(certificate, certificate.proof.deviation_bound, every_text(certificate))
     if nearer_for_signal(certificate.family_proof):
         bound = partial(deviation_of_signal, certificate.family_proof)
-        again = certificate.rate is not None
+        again = certificate.proof.rate is not None
         usual = (
-            list(_family_error(certificate, certificate.deviation_bound, " (these signals)", again)) if again else []
+            list(_family_error(certificate, certificate.proof.deviation_bound, " (these signals)", again))
+            if again
+            else []
         )
         own = _family_error(certificate, bound, " (these signals)", again)
         yield from (fact for fact in own if fact not in usual)

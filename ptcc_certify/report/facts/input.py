@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 def input_facts(certificate: Certificate, details: bool) -> Facts:
     """Tell whether the input stays finite, how large it gets and of which agent, by what, and under which limits."""
-    effort = certificate.effort
-    if effort is None or certificate.constant:
+    effort = certificate.graph_proof.effort
+    if effort is None or certificate.proof.constant:
         return
     yield _input_fact(certificate, effort)
     if not details:
@@ -63,8 +63,8 @@ def peak_fact(
 
 def threshold_facts(certificate: Certificate) -> Facts:
     """Tell what decides whether the input is bounded."""
-    effort = certificate.effort
-    if effort is None or certificate.constant:
+    effort = certificate.graph_proof.effort
+    if effort is None or certificate.proof.constant:
         return
     lower, upper = effort.threshold
     whose = "the nominal part is " if effort.sliding is not None else ""
@@ -75,7 +75,7 @@ def threshold_facts(certificate: Certificate) -> Facts:
         text = f"{whose}bounded from every initial state: {how}"
     elif effort.bounded is False:
         below = f" <= {up(upper, 5)}" if upper is not None and effort.by == "upper_bound" else " = 1 or less"
-        enough = "" if certificate.rate is None else f" to {up(2 / certificate.rate, 5)} or more"
+        enough = "" if certificate.proof.rate is None else f" to {up(2 / certificate.proof.rate, 5)} or more"
         text = f"rho2 kappa min Re lambda{below}, 1 is needed: raise rho2 kappa{enough}"
         text = f"NOT BOUNDED without limits: {text}" if certificate.limits else text
     else:
@@ -96,7 +96,7 @@ def _size_facts(certificate: Certificate, effort: Effort) -> Facts:
         part = " (integrals of the nominal part)" if effort.sliding is not None else ""
         yield Fact(head="effort", note=", ".join(sizes) + whom + part, detail=True)
     other = bool(certificate.limits) or not certificate.direct  # the initial state that is found is of neither
-    worst = None if effort.peak is None or other else certificate.worst_initial_state
+    worst = None if effort.peak is None or other else certificate.graph_proof.worst_initial_state
     if worst is not None and math.isfinite(worst.size):
         where = f"|u_{labelled(certificate.labels[worst.agent])}| = {worst.size:.4g} at t = {worst.t:.4g}"
         text = f"largest found (numerical) {where} from {value_list(certificate.labels, worst.x0.tolist())}"
@@ -108,7 +108,7 @@ def _size_facts(certificate: Certificate, effort: Effort) -> Facts:
 
 def disturbed_facts(certificate: Certificate) -> Facts:
     """Tell what disturbances add to the input under the nominal protocol, and without limits to the final state."""
-    effort = certificate.effort
+    effort = certificate.graph_proof.effort
     if effort is not None and (d := effort.disturbed) is not None:
         held = any(entry.sample_period is not None for entry in certificate.limits)
         text = f"|d_k| <= {down(d.delta, 12)} adds at most {up(max(d.inputs), 4)} to |u_k|"
@@ -148,19 +148,20 @@ def initial_states_text(initial_set: InitialSet) -> str:
 
 def family_input_facts(certificate: Certificate) -> Facts:
     """Tell whether the input stays finite for every signal, and how large it gets."""
-    every, peaks = every_text(certificate), certificate.input_peaks
-    if any(part.component.behaviour is None for part in certificate.parts):
+    proof = certificate.family_proof
+    every, peaks = every_text(certificate), proof.input_peaks
+    if any(part.component.behaviour is None for part in proof.parts):
         return
-    if not certificate.bounded or certificate.refused:
+    if not proof.bounded or certificate.refused:
         loud, text = False, f"not proved bounded{every}"
-        if not certificate.common:
+        if not proof.common:
             loud, text = True, f"no bound for all signals and x(0): a switch near T may meet any gain{every}"
-        elif certificate.unbounded:
+        elif proof.unbounded:
             loud, text = True, "NOT BOUNDED for some signal from some initial states"
         yield Fact(head="input", standing="unproved", note=text, loud=loud)
-    elif peaks is None and certificate.sliding_bounded is False:
+    elif peaks is None and proof.sliding_bounded is False:
         text = "the nominal part is bounded, of the sliding part nothing is proved"
-        if certificate.sliding_peaks is not None:
+        if proof.sliding_peaks is not None:
             text = "bounded while sigma(0) = 0"
         yield Fact(head="input", note=text)
     elif not peaks:

@@ -31,7 +31,7 @@ FROM_WITHIN_1 = ", from within 1 of it at first"
 
 def late_facts(certificate: Certificate) -> Facts:
     """Tell how late messages are; what cannot be then, and what is left at the deadline."""
-    late = certificate.late
+    late = certificate.proof.late
     if late is None:
         return
     yield from _vehicles(late)
@@ -86,10 +86,14 @@ def _vehicles(late: LateBounds) -> Facts:
 
 def tracking_facts(certificate: Certificate) -> Facts:
     """Tell how followers track leaders that move."""
-    tracking = certificate.tracking
+    tracking = certificate.proof.tracking
     if tracking is None:
-        if certificate.asked_leaders is not None and certificate.late is None and certificate.asked_messages is None:
-            yield Fact(head="leaders", note=leaders_text(certificate.asked_leaders))
+        if (
+            certificate.proof.asked_leaders is not None
+            and certificate.proof.late is None
+            and certificate.proof.asked_messages is None
+        ):
+            yield Fact(head="leaders", note=leaders_text(certificate.proof.asked_leaders))
             text = "nothing is proved: no vector for the followers was found"
             yield Fact(head="tracking", standing="unproved", note=text, loud=True)
         return

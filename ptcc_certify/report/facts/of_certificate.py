@@ -61,10 +61,12 @@ def facts_of(
         name = certificate.origins.get("graph", "" if certificate.of_family else "graph")
     facts: list[Fact] = []
     if certificate.of_family:
-        components = [part.component for part in certificate.parts]
-        facts += family_facts(certificate.family, name, origins.get("read", ""), components if details else None)
+        components = [part.component for part in certificate.family_proof.parts]
+        facts += family_facts(
+            certificate.family_proof.family, name, origins.get("read", ""), components if details else None
+        )
     else:
-        facts += graph_facts(certificate.structure, name, details)
+        facts += graph_facts(certificate.graph_proof.structure, name, details)
     facts += protocol_facts(certificate, origins)
     if not rejects(certificate.checked):
         facts += _answers(certificate, origins, details)
@@ -75,12 +77,12 @@ def _answers(certificate: Certificate, origins: Mapping[str, str], details: bool
     """Tell what becomes of the agents: first with late messages and moving leaders, if there are any."""
     labels, protocol = certificate.labels, certificate.protocol
     yield from initial_facts(certificate, origins, alone=certificate.only_drawn)
-    yield from sliding_facts(labels, protocol.reaching, certificate.sigma0, certificate.reaching)
+    yield from sliding_facts(labels, protocol.reaching, certificate.sigma0, certificate.proof.reaching)
     yield from late_facts(certificate)
     yield from tracking_facts(certificate)
     beside = _beside(certificate)
     if certificate.of_family:
-        components = [part.component for part in certificate.parts]
+        components = [part.component for part in certificate.family_proof.parts]
         yield from family_claims(components, f" at T = {near(protocol.T)}", certificate)
     else:
         yield from claim_facts(certificate)
@@ -91,13 +93,13 @@ def _answers(certificate: Certificate, origins: Mapping[str, str], details: bool
 def _of_graph(certificate: Certificate, details: bool, beside: bool) -> Facts:
     """Tell of one graph where its agents end, how fast, and with what input; ``beside`` if more is told before."""
     drawn = certificate.only_drawn
-    if certificate.agents is not None:
-        yield from agents_facts(certificate.agents, details)
+    if certificate.proof.agents is not None:
+        yield from agents_facts(certificate.proof.agents, details)
     elif not drawn:
-        yield from _details(final_facts(certificate), certificate.leaders_move)
+        yield from _details(final_facts(certificate), certificate.proof.leaders_move)
     if details:
         yield from rate_facts(certificate)
-    if certificate.agents is None and (details or not beside):
+    if certificate.proof.agents is None and (details or not beside):
         yield from _details(error_facts(certificate, drawn, details), beside)
         yield from _details(input_facts(certificate, details), beside)
         yield from _details(disturbed_facts(certificate), beside)
@@ -111,7 +113,7 @@ def _of_family(certificate: Certificate, details: bool, beside: bool) -> Facts:
     if details:
         yield from function_facts(certificate)
     yield from signal_facts(certificate)
-    yield from _details(family_final_facts(certificate), certificate.leaders_move)
+    yield from _details(family_final_facts(certificate), certificate.proof.leaders_move)
     yield from _details(family_error_facts(certificate), beside)
     yield from _details(family_input_facts(certificate), beside)
 

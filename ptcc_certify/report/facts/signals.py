@@ -46,24 +46,25 @@ def signal_facts(certificate: Certificate) -> Facts:
 
     Where agents end then is told by :mod:`ptcc_certify.certificate.constrained_switching.states`.
     """
-    if certificate.signal == "any":
+    proof = certificate.family_proof
+    if proof.signal == "any":
         return
-    head = signal_text(certificate.signal)
-    if isinstance(certificate.signal, DwellTime) and certificate.signal.clock == "t":
-        longer = certificate.signal.least > certificate.protocol.T
+    head = signal_text(proof.signal)
+    if isinstance(proof.signal, DwellTime) and proof.signal.clock == "t":
+        longer = proof.signal.least > certificate.protocol.T
         head = head[0], head[1] + (", longer than T: at most one switch" if longer else "")
-    several = len(certificate.parts) > 1
+    several = len(proof.parts) > 1
 
     def where(component: int) -> str:
-        name = agent_text(certificate.parts[component].component.family.labels[0])
+        name = agent_text(proof.parts[component].component.family.labels[0])
         return f"component of {name}: " if several else ""
 
     none = reasons_for_none(certificate.family_proof)
-    if not certificate.restricted and not none:
+    if not proof.restricted and not none:
         yield Fact(head=head[0], note=f"{head[1]}: nothing more is proved")
     for number, (reason, _) in none.items():
         yield Fact(head=head[0], note=f"{where(number)}{head[1]}: {reason}")
-    for claim in certificate.restricted:
+    for claim in proof.restricted:
         if claim.component in none or (isinstance(claim, FinalValueClaim) and not _stands_alone(certificate, claim)):
             continue
         if isinstance(claim, LastModeClaim | FinalValueClaim):
@@ -77,7 +78,7 @@ def signal_facts(certificate: Certificate) -> Facts:
 
 def every_text(certificate: Certificate) -> str:
     """Tell apart what holds for every signal where more is claimed of some."""
-    return "" if certificate.signal == "any" else " (every signal)"
+    return "" if certificate.family_proof.signal == "any" else " (every signal)"
 
 
 def signal_text(signal: SignalClass) -> tuple[str, str]:
@@ -99,8 +100,8 @@ def signal_text(signal: SignalClass) -> tuple[str, str]:
 
 def _stands_alone(certificate: Certificate, claim: FinalValueClaim) -> bool:
     """Tell whether no other claim says what single modes do to a component whose end depends on the signal."""
-    depends = certificate.parts[claim.component].component.behaviour == DEPENDS
-    return depends and claim.component not in certificate.ends_of_signal
+    depends = certificate.family_proof.parts[claim.component].component.behaviour == DEPENDS
+    return depends and claim.component not in certificate.family_proof.ends_of_signal
 
 
 def _last_mode_text(certificate: Certificate, claim: LastModeClaim | FinalValueClaim) -> str:
@@ -110,14 +111,14 @@ def _last_mode_text(certificate: Certificate, claim: LastModeClaim | FinalValueC
     unknown = "rest where the weights say" if claim.signal == "constant" else "no limit while weights move"
     if isinstance(claim, FinalValueClaim):
         unknown = "nothing is claimed"
-    modes = certificate.parts[claim.component].component.family.modes
+    modes = certificate.family_proof.parts[claim.component].component.family.modes
     pairs = zip(own, modes, strict=True)
     behaviours = [of_mode(behaviour, mode, unknown) for behaviour, mode in pairs]
     late = "; how near by when depends on the last switch" if begin else "; how near by when is not proved"
     if len(set(behaviours)) == 1:
         camps = ", camps of that mode" if begin and own[0] == BIPARTITE_CONSENSUS else ""
         return f"{begin}: {behaviours[0]}{camps}{late}".removeprefix(": ")
-    names = (labelled(printable(mode_name(certificate.family, k))) for k in range(len(behaviours)))
+    names = (labelled(printable(mode_name(certificate.family_proof.family, k))) for k in range(len(behaviours)))
     each = "; ".join(f"{name}: {behaviour}" for name, behaviour in zip(names, behaviours, strict=True))
     return f"{begin}: {each}{late}".removeprefix(": ")
 
@@ -142,7 +143,10 @@ def _window_text(claim: WindowClaim) -> str:
 
 
 def _share_text(certificate: Certificate, claim: ShareClaim) -> str:
-    names = (labelled(printable(mode_name(certificate.family, k))) for k in range(len(certificate.family.modes)))
+    names = (
+        labelled(printable(mode_name(certificate.family_proof.family, k)))
+        for k in range(len(certificate.family_proof.family.modes))
+    )
     own = map(down, claim.form.function.rates)
     each = ", ".join(f"{name} {rate}" for name, rate in zip(names, own, strict=True))
     late = "how near by when depends on how far the shares stray"
@@ -151,7 +155,7 @@ def _share_text(certificate: Certificate, claim: ShareClaim) -> str:
 
 def rests(certificate: Certificate) -> bool:
     """Tell whether the signals that were asked for bring all agents to rest whose end depends on the signal."""
-    claims = certificate.ends_of_signal.values()
+    claims = certificate.family_proof.ends_of_signal.values()
     return not any(isinstance(claim, LastModeClaim) and None in claim.behaviours for claim in claims)
 
 
@@ -170,17 +174,18 @@ def agreement_text(certificate: Certificate) -> str:
     bipartite consensus
     depends on the signal, all at one |x(T)|
     """
-    of_one = len(certificate.parts) == 1
-    claims = [claim for claim in certificate.ends_of_signal.values() if of_one and isinstance(claim, LastModeClaim)]
+    proof = certificate.family_proof
+    of_one = len(proof.parts) == 1
+    claims = [claim for claim in proof.ends_of_signal.values() if of_one and isinstance(claim, LastModeClaim)]
     if not claims or {*claims[0].behaviours} != {BIPARTITE_CONSENSUS}:
         return ""
-    signs = (mode.sign for mode in certificate.parts[0].component.family.modes)
+    signs = (mode.sign for mode in proof.parts[0].component.family.modes)
     return ", all at one value" if all((sign > 0).all() for sign in signs) else ", all at one |x(T)|"
 
 
 def _rate_text(certificate: Certificate, claim: RateClaim) -> str:
     if claim.forms is None:
-        more = "" if claim.component in certificate.final_values else "; nothing more is proved"
+        more = "" if claim.component in certificate.family_proof.final_values else "; nothing more is proved"
         return f"rate {down(claim.rate)}, as for every signal{more}"
     text = f"rate {down(claim.rate)}" if claim.rate > 0 else "no rate is proved"
     if claim.ratio > 1 and isinstance(claim.signal, DwellTime):

@@ -35,7 +35,7 @@ _SHORT, _LONG = 2 * TEXT - 20, 12 * TEXT
 
 def initial_facts(certificate: Certificate, origins: Mapping[str, str], alone: bool) -> Facts:
     """Tell the initial positions, and where they come from; ``alone`` if those of the simulated run alone."""
-    if (begin := certificate.initial_positions) is not None:
+    if (begin := certificate.proof.initial_positions) is not None:
         drawn = f" ({origins['x(0)']})" if "x(0)" in origins else ""
         text = value_list(certificate.labels, begin) + drawn
         text += ", of the simulated run alone" if alone else ""
@@ -44,7 +44,7 @@ def initial_facts(certificate: Certificate, origins: Mapping[str, str], alone: b
 
 def final_facts(certificate: Certificate) -> Facts:
     """Tell where the agents end: each of them, or in two lines those at the same state together, or the extremes."""
-    result, labels = certificate.final_positions, certificate.labels
+    result, labels = certificate.graph_proof.final_positions, certificate.labels
     if result is None:
         return
     remarks = {
@@ -95,14 +95,15 @@ def _accuracy(result: FinalState, rounded: str = "here to 5 digits") -> str:
 
 def family_final_facts(certificate: Certificate) -> Facts:
     """Tell between which ends every agent is at the deadline, agents with the same ends together."""
+    proof = certificate.family_proof
     if certificate.refused:
         return
     labels = certificate.labels
     ends: Sequence[Interval | None] | None = None
     head, more = "x(T)", ""
-    if certificate.final_state is not None and certificate.common:
-        ends, more = certificate.final_state, every_text(certificate)
-    elif certificate.final_state is not None and any(one is not None for one in last_states(certificate.family_proof)):
+    if proof.final_state is not None and proof.common:
+        ends, more = proof.final_state, every_text(certificate)
+    elif proof.final_state is not None and any(one is not None for one in last_states(certificate.family_proof)):
         ends, more = states_of_signal(certificate.family_proof), f"{agreement_text(certificate)} (these signals)"
         head = "x(T)" if rests(certificate) else "x(t)"
     if ends is not None:
@@ -112,14 +113,16 @@ def family_final_facts(certificate: Certificate) -> Facts:
         brief = f"{constant_text(certificate, _SHORT)} (constant weights)"
         yield Fact(head="x(T)", note=f"{text} (constant weights; {attained_text(certificate)})", brief=(brief,))
     for place, (k, kept) in enumerate(told_ranges(certificate).items()):
-        component = certificate.parts[k].component
+        component = proof.parts[k].component
         text, brief = (range_text(component, kept, width) for width in (12 * TEXT, TEXT))
         yield Fact(head="x(t)", note=text, brief=(brief,), detail=place > 0)
 
 
 def attained_text(certificate: Certificate) -> str:
     """Tell how near some constant weights come to the ends that are told of all of them."""
-    values = (ends for claim in certificate.final_values.values() for ends in claim.values if ends is not None)
+    values = (
+        ends for claim in certificate.family_proof.final_values.values() for ends in claim.values if ends is not None
+    )
     within = max(ends.within for ends in values)
     return f"some weights come within {up(within, 2)} of either end" if within else "some weights attain these ends"
 
@@ -135,12 +138,17 @@ def constant_text(certificate: Certificate, width: int = 12 * TEXT) -> str:
     >>> constant_text(certify(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [0, 6], signal="constant"))
     'every agent in [2, 3]'
     """
-    columns = certificate.family.labels, constant_states(certificate.family_proof), certificate.final_state or ()
+    proof = certificate.family_proof
+    columns = (
+        proof.family.labels,
+        constant_states(certificate.family_proof),
+        proof.final_state or (),
+    )
     rows = [row for row in zip(*columns, strict=False) if None not in row]
     if all(interval_text(own) == interval_text(every) for _, own, every in rows):
         return ""
     text = intervals_text([label for label, *_ in rows], [own for _, own, _ in rows], width)
-    whole = len(rows) == certificate.family.n_nodes
+    whole = len(rows) == proof.family.n_nodes
     return (
         text
         if whole

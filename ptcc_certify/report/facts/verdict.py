@@ -38,17 +38,17 @@ def protocol_facts(certificate: Certificate, origins: Mapping[str, str]) -> Fact
 def _beginning(certificate: Certificate, origins: Mapping[str, str]) -> list[str]:
     """Tell where initial positions, velocities and so on, and sliding variables, come from."""
     begin = [] if certificate.initial_state is None else [f"x(0) {origins.get('x(0)', 'given')}"]
-    if certificate.agents is not None and (states := certificate.agents.initial_state) is not None:
+    if certificate.proof.agents is not None and (states := certificate.proof.agents.initial_state) is not None:
         begin = []
-        for i, name in enumerate(("x(0)", "v(0)", "a(0)")[: certificate.agents.order]):
+        for i, name in enumerate(("x(0)", "v(0)", "a(0)")[: certificate.proof.agents.order]):
             still = i > 0 and not any(chain[i] for agent in states for chain in agent)
             begin.append(f"{name} {origins.get(name, '0' if still else 'given')}")
-    vehicles = None if certificate.late is None else certificate.late.messages.vehicles
+    vehicles = None if certificate.proof.late is None else certificate.proof.late.messages.vehicles
     if vehicles is not None:
         begin.append(f"v(0) {origins.get('v(0)', 'given' if any(vehicles.v0) else '0')}")
     if certificate.initial_set is not None and (not begin or certificate.only_drawn):
         begin = [initial_states_text(certificate.initial_set)]
-    begin += ["in a formation"] if certificate.offsets is not None else []
+    begin += ["in a formation"] if certificate.proof.offsets is not None else []
     if certificate.sigma0 is not None:
         begin += ["sigma(0) 0" if certificate.direct else f"sigma(0) {origins.get('sigma(0)', 'given')}"]
     return begin
@@ -63,7 +63,7 @@ def run_facts(certificate: Certificate) -> Facts:
         texts.append(f"CVODES: bounds {word}, worst ratio of V {seen.decay:.4g}, of all bounds {seen.worst:.4g}")
     if run is not None and run.sliding is not None:
         texts.append(f"the run meets d = {run.sliding.source}; |d| <= delta: {run.sliding.bounded_by}")
-    if run is not None and comparison is not None and not certificate.constant:
+    if run is not None and comparison is not None and not certificate.proof.constant:
         word = "VIOLATED" if comparison.violated else "kept"
         if not comparison.judged:
             word = "not tested, all is below the floor"
@@ -78,8 +78,8 @@ def run_facts(certificate: Certificate) -> Facts:
         reaching = "kept" if comparison.reaching_kept else "VIOLATED"
         ratio = f"worst |sigma| ratio {comparison.sliding_ratio or 0:.4g}"
         texts.append(f"reaching times {reaching}, the last {when} (agent {labelled(run.labels[last])}); {ratio}")
-    if run is not None and certificate.final_state is not None:
-        gap = float(abs(run.final_state - certificate.final_state).max())
+    if run is not None and certificate.proof.final_state is not None:
+        gap = float(abs(run.final_state - certificate.proof.final_state).max())
         remark = "" if run.deadline_resolved else " (the run had not settled)"
         texts.append(f"end state within {gap:.1e} of the final state{remark}")
     yield from (Fact(head="simulated", standing="observed", note=text, detail=True) for text in texts)
@@ -91,7 +91,7 @@ def verdict_facts(certificate: Certificate) -> Facts:
     report, assessment = certificate.checked, certificate.assessment
     if ended:
         yield Fact(head="time limit", note=(*ended, "; what was proved by then stands"), detail=True)
-    notes = [note for note in certificate.notes if note not in certificate.reading_notes]
+    notes = [note for note in certificate.observed.notes if note not in certificate.proof.reading_notes]
     yield from (Fact(head="note", note=note, detail=True) for note in notes[:_NOTES])
     if report is None:
         yield Fact(head="proof", standing="unproved", note="nothing to check", detail=True)
@@ -112,8 +112,8 @@ def verdict_facts(certificate: Certificate) -> Facts:
 
 def _cut_off(certificate: Certificate) -> Sentence:
     """Tell what was cut off because it took longer than its share of the time limit; nothing if nothing was."""
-    if not certificate.cut_off:
+    if not certificate.observed.cut_off:
         return ""
-    shares = "its share" if len(certificate.cut_off) == 1 else "their shares"
+    shares = "its share" if len(certificate.observed.cut_off) == 1 else "their shares"
     limit = Change("time_limit", f"{certificate.time_limit:g}")
-    return (f"{', '.join(certificate.cut_off)} cut off after {shares} of ", limit, " s")
+    return (f"{', '.join(certificate.observed.cut_off)} cut off after {shares} of ", limit, " s")

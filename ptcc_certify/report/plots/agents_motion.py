@@ -44,8 +44,8 @@ def agents_run(subject: Any) -> AgentsTrajectory:
         The subject is none, or of single integrators.
     """
     subject = read_back(subject)
-    if isinstance(subject, Certificate) and subject.agents is not None:
-        return subject.observed.agents_run or subject.agents.simulate()
+    if isinstance(subject, Certificate) and subject.proof.agents is not None:
+        return subject.observed.agents_run or subject.proof.agents.simulate()
     if isinstance(subject, AgentsAnswer):
         return subject.simulate()
     if isinstance(subject, AgentsTrajectory):

@@ -127,7 +127,7 @@ def plot_decay(
     if p.reaching is not None and (proved is None or not proved.direct):
         (at,) = _places(p.gain, None, np.array([float(p.span / p.T)]))[axis]
         ax.axvline(at, color="black", linewidth=0.8, linestyle=(0, (5, 2, 1, 2)), label="$T_r$")
-    name = r"\varepsilon" if proved is not None and proved.envelope.coordinates == "eps" else "E"
+    name = r"\varepsilon" if proved is not None and proved.graph_proof.envelope.coordinates == "eps" else "E"
     title = "" if run is None else limits_text(run if asked is None else asked, proved)
     return finished(ax, _label(axis, time_unit), rf"$\|{name}(t)\| \,/\, \|{name}(0)\|$", title)
 
@@ -136,14 +136,14 @@ def _draw_signals(ax: Axes, certificate: Certificate, runs: Sequence[Trajectory]
     """Draw how far agents are from their final states under many signals below the bound for every signal."""
     first = runs[0]
     before = first.remaining > 0
-    bound = certificate.deviation_bound(first.remaining[before]).max(axis=0)
+    bound = certificate.proof.deviation_bound(first.remaining[before]).max(axis=0)
     if not np.isfinite(bound).any():
         raise ParameterError("the certificate holds no proved bound of a decay; draw its states")
     place = {"left": first.remaining, "time": first.t, "clock": first.clock}[axis][before]
     floor = FLOOR_FACTOR * first.rtol * (float(np.abs(first.states[:, 0]).max()) or 1.0)
     if not (bound >= floor).any():
         raise ParameterError("every agent begins where it ends: there is no decay to draw")
-    own = certificate.signal == "any" or keeps_promise(certificate, runs)
+    own = certificate.family_proof.signal == "any" or keeps_promise(certificate, runs)
     names = {False: "random signals" if own else "any signal (random)", True: "worst cases found"}
     known = _known_end(certificate)
     for run in sorted(runs, key=is_worst):
@@ -160,8 +160,8 @@ def _draw_signals(ax: Axes, certificate: Certificate, runs: Sequence[Trajectory]
 
 def _known_end(certificate: Certificate) -> np.ndarray | None:
     """Return the state at ``T`` if it is proved to be the same for every signal."""
-    ends = [] if certificate.final_state is None else [one for one in certificate.final_state if one is not None]
-    same = len(ends) == certificate.family.n_nodes and all(low == high for low, high in ends)
+    ends = [one for one in certificate.family_proof.final_state or () if one is not None]
+    same = len(ends) == certificate.family_proof.family.n_nodes and all(low == high for low, high in ends)
     return np.array([float(low) for low, _ in ends]) if same else None
 
 
@@ -190,13 +190,14 @@ def error_norm(subject: Certificate | Trajectory, certificate: Certificate | Non
     neither overflow nor vanish. Of a certificate without a run the first instant alone is there.
     """
     if isinstance(subject, Trajectory):
-        states, tolerance = subject.states[:, subject.remaining > 0], subject.rtol
+        graph, states, tolerance = subject.graph, subject.states[:, subject.remaining > 0], subject.rtol
     else:
-        states, tolerance = np.array([[float(x)] for x in subject.initial_state or ()]), 0.0
-    laplacian = subject.graph.laplacian()
+        graph, tolerance = subject.graph_proof.graph, 0.0
+        states = np.array([[float(x)] for x in subject.initial_state or ()])
+    laplacian = graph.laplacian()
     unit = float(np.abs(states).max(initial=0)) or 1.0
-    if certificate is not None and certificate.envelope.coordinates == "eps":
-        z = certificate.envelope.functions[0].coordinates_of(states / unit, laplacian)
+    if certificate is not None and certificate.graph_proof.envelope.coordinates == "eps":
+        z = certificate.graph_proof.envelope.functions[0].coordinates_of(states / unit, laplacian)
         multiple = 2 * math.sqrt(len(states))  # bounds ||dz|| for an error of 1 in every state
     else:
         z, multiple = laplacian @ (states / unit), float(np.linalg.norm(abs(laplacian).sum(axis=1)))
@@ -214,7 +215,7 @@ def resolved(norm: np.ndarray, bound: np.ndarray, floor: float) -> np.ndarray:
 def _require_bounds(certificate: Certificate, run: Trajectory | None) -> None:
     if certificate.initial_state is None:
         raise ParameterError("the certificate has no initial state, from which something decays; certify with x0")
-    if not certificate.envelope.functions:
+    if not certificate.graph_proof.envelope.functions:
         raise ParameterError("the certificate holds no proved bound of a decay")
     if run is not None:
         require_same(run, certificate)
@@ -230,7 +231,7 @@ def _bounds(
     certificate: Certificate, remaining: np.ndarray, unit: float, each: bool
 ) -> dict[str, tuple[np.ndarray, dict[str, Any]]]:
     """Return the bounds of every Lyapunov function in the norm, and the best of all, with how they are drawn."""
-    envelope, x0 = certificate.envelope, certificate.initial_state
+    envelope, x0 = certificate.graph_proof.envelope, certificate.initial_state
     functions = [m for m in envelope.functions if m.coordinates == envelope.coordinates]
     bounds: dict[str, tuple[np.ndarray, dict[str, Any]]] = {}
     label: str | None = "each Lyapunov function"
@@ -238,7 +239,7 @@ def _bounds(
         values = replace(envelope, functions=(function,)).norm_bound(remaining, x0) / unit
         if function.kind == "paper":
             style: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": "--", "zorder": 2.1}
-            style["label"] = f"bound of {certificate.theorems_named}"
+            style["label"] = f"bound of {certificate.graph_proof.theorems_named}"
         else:
             style = {"color": BOUND, "linewidth": 0.6, "alpha": 0.6, "linestyle": "-.", "label": label}
             label = None

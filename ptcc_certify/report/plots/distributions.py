@@ -43,9 +43,9 @@ def plot_final_states(certificate: Certificate, *, ax: Axes | None = None) -> Ax
     >>> int(sum(bar.get_height() for bar in ax.patches))
     3
     """
-    if (ends := certificate.final_positions) is None:
+    if (ends := certificate.graph_proof.final_positions) is None:
         raise ParameterError("the certificate has no final state; certify the graph with x0")
-    values, followers = np.asarray(ends), certificate.structure.followers
+    values, followers = np.asarray(ends), certificate.graph_proof.structure.followers
     leaders = np.delete(np.arange(values.size), followers)
     ax = axes_of(ax)
     parts = {"leaders": (values[leaders], RUN), "followers": (values[followers], BEHIND)}

@@ -91,7 +91,7 @@ def plot_input(
         draw_deadlines(ax, runs[0])
         return finished(ax, x, r"$\max_k |u_k|$", count_of_signals(subject, runs))
     certificate = subject if isinstance(subject, Certificate) else certificate
-    if isinstance(subject, AgentsTrajectory) or (certificate is not None and certificate.agents is not None):
+    if isinstance(subject, AgentsTrajectory) or (certificate is not None and certificate.proof.agents is not None):
         moved = agents_run(subject)
         run: Trajectory | AgentsTrajectory = moved
         sliding = moved.protocol.base.reaching is not None
@@ -115,11 +115,12 @@ def plot_input(
 
 def _draw_signals(ax: Axes, certificate: Certificate, runs: Sequence[Trajectory]) -> None:
     """Draw the largest input under many signals below its bound for every signal, and the proved peak."""
+    proof = certificate.family_proof
     first, gain = runs[0], certificate.protocol.gain
     before = first.remaining > 0
     t, left = first.t[before], first.remaining[before]
     floor = FLOOR_FACTOR * first.rtol * (float(np.abs(first.states[:, 0]).max()) or 1.0)
-    noise = 2 * float(Members(certificate.family).in_weight.max(initial=0.0)) * floor
+    noise = 2 * float(Members(proof.family).in_weight.max(initial=0.0)) * floor
     others = "other signals" if any(map(is_worst, runs)) else "random signals"
     names, sizes = {False: others, True: "slowest found"}, []
     for run in runs:
@@ -128,18 +129,18 @@ def _draw_signals(ax: Axes, certificate: Certificate, runs: Sequence[Trajectory]
         resolved = np.where(size > noise * gain.value_at_remaining(run.remaining[own]), size, np.nan)
         ax.plot(run.t[own], resolved, label=names.pop(is_worst(run), None), **line_of(run))
         sizes.append(np.interp(first.t, run.t[own], np.nan_to_num(resolved), right=0.0))
-    bound = certificate.input_bound(left).max(axis=0)
+    bound = proof.input_bound(left).max(axis=0)
     if np.isfinite(bound).all():
         ax.plot(t, bound, color=BOUND, linewidth=1.8, label=bound_label(certificate))
         sizes.append(np.interp(first.t, t, bound, right=0.0))
-    peaks = [Peak(float(peak), f"certified peak {up(peak, 4)}") for peak in sorted(certificate.input_peaks or ())[-1:]]
+    peaks = [Peak(float(peak), f"certified peak {up(peak, 4)}") for peak in sorted(proof.input_peaks or ())[-1:]]
     draw_peaks(ax, first.t, np.array(sizes), peaks)
     ax.set_xlim(0, float(first.t[-1]))
 
 
 def _agents_peaks(certificate: Certificate, sliding: bool) -> list[Peak]:
     """Return the proved peak of agents of order n, of the whole input."""
-    part = certificate.agents
+    part = certificate.proof.agents
     if part is None or part.input is None:
         return []
     largest = max(part.input)
@@ -156,14 +157,14 @@ def _every_period_sampled(run: Trajectory) -> bool:
 
 def _peaks(run: Trajectory, certificate: Certificate) -> list[Peak]:
     """Return what bounds the input of a run, and with late messages."""
-    late = certificate.late
+    late = certificate.proof.late
     peak = None if run.vehicles else _certified_peak(run, certificate)  # which is of the virtual positions then
     found = [] if peak is None else [Peak(peak, f"certified peak {up(peak, 4)}{_set_text(run, certificate)}")]
     if late is not None and (largest := largest_late_input(late, certificate.protocol)) is not None:
         whole = ", from within 1 of the final states" if late.relative else ""
         found.append(Peak(float(largest), f"late messages: at most {up(largest, 4)}{whole}", BOUND))
     leads = run.conditions.leaders is not None and run.conditions.messages is None
-    tracking = certificate.tracking if leads else None
+    tracking = certificate.proof.tracking if leads else None
     if tracking is not None and tracking.input is not None:
         most = float(tracking.input.max())
         found.append(Peak(most, f"moving leaders: at most {up(most, 4)}", BOUND))
@@ -172,9 +173,9 @@ def _peaks(run: Trajectory, certificate: Certificate) -> list[Peak]:
 
 def _set_text(run: Trajectory, certificate: Certificate) -> str:
     """Name the set of initial states for which a peak is proved, and say whether a run begins outside a box."""
-    region = certificate.effort and certificate.effort.initial_set
+    region = certificate.graph_proof.effort and certificate.graph_proof.effort.initial_set
     if not region:
-        return "" if certificate.late is None else ", messages at once"
+        return "" if certificate.proof.late is None else ", messages at once"
     outside = False
     if region.radius:
         center, radius = (np.array(list(map(float, numbers))) for numbers in (region.center, region.radius))
@@ -344,7 +345,7 @@ def _certified_effort(trajectory: Trajectory, certificate: Certificate) -> Effor
         The certificate is of another graph, protocol or initial state.
     """
     require_same(trajectory, certificate)
-    effort, slid = certificate.effort, trajectory.sliding
+    effort, slid = certificate.graph_proof.effort, trajectory.sliding
     met = trajectory.conditions
     unknown = met.forcing is not None or 0.0 not in trajectory.t[:1]
     unknown = unknown or (slid is not None and slid.boundary_layer is not None)

@@ -47,7 +47,7 @@ def sample_runs(certificate: Certificate, signals: Iterable[Signal] | None = Non
     more: dict[str, Any] = {}
     if certificate.sigma0 is not None:
         more = {"sigma0": [float(s) for s in certificate.sigma0], "samples": _SAMPLES}
-    return [simulate(certificate.family, certificate.protocol, start, signal, **more) for signal in chosen]
+    return [simulate(certificate.family_proof.family, certificate.protocol, start, signal, **more) for signal in chosen]
 
 
 def _signals(certificate: Certificate) -> list[Signal]:
@@ -57,7 +57,7 @@ def _signals(certificate: Certificate) -> list[Signal]:
 
 def _of_the_kind(certificate: Certificate) -> list[Signal]:
     """Return signals that keep what a certificate was asked of; none where that is any, or where none is known."""
-    signal, modes = certificate.signal, certificate.family.modes
+    signal, modes = certificate.family_proof.signal, certificate.family_proof.family.modes
     if isinstance(signal, DwellTime):
         return [RandomDwellSignal(signal, seed) for seed in range(_RANDOM)]
     if signal == "constant":
@@ -112,7 +112,7 @@ def bound_label(certificate: Certificate) -> str:
 def count_of_signals(certificate: Certificate, runs: Sequence[Trajectory]) -> str:
     """Tell how many signals are drawn, and where some are promised, whether these keep the promise or are any."""
     kept = " of the kind asked for" if keeps_promise(certificate, runs) else " of any kind"
-    return f"{len(runs)} signals{'' if certificate.signal == 'any' else kept}"
+    return f"{len(runs)} signals{'' if certificate.family_proof.signal == 'any' else kept}"
 
 
 def is_worst(run: Trajectory) -> bool:

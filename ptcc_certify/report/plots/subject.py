@@ -148,12 +148,12 @@ def structure_of(subject: Any) -> Structure:
     refuse_family(subject)
     if isinstance(subject, Structure):
         return subject
-    return subject.structure if isinstance(subject, Certificate) else analyse(as_graph(subject))
+    return subject.graph_proof.structure if isinstance(subject, Certificate) else analyse(as_graph(subject))
 
 
 def ideal_text(certificate: Certificate) -> str:
     """Say what of a certificate is not in its bounds over time: limits of the gain, late messages, moving leaders."""
-    late, moving = certificate.late, certificate.leaders_move
+    late, moving = certificate.proof.late, certificate.proof.leaders_move
     virtual = late is not None and late.messages.vehicles is not None
     absent = {
         "virtual positions": virtual,
@@ -179,8 +179,8 @@ def limits_text(run: Trajectory, certificate: Certificate | None) -> str:
         forced = certificate.sigma0 is None and met.forcing is None and leaders is None
         absent = {
             "without the limits of the gain": limits is None and certificate.limits,
-            "without late messages": messages is None and certificate.late and not vehicles,
-            "leaders at rest": leaders is None and certificate.leaders_move,
+            "without late messages": messages is None and certificate.proof.late and not vehicles,
+            "leaders at rest": leaders is None and certificate.proof.leaders_move,
             "without disturbance": forced and certificate.delta,
             "without noise": forced and certificate.noise,
         }

@@ -63,7 +63,7 @@ def plot_tracking(subject: Any, *, ax: Axes | None = None, time_unit: str = "") 
     ['worst leaders', 'proved bound', '$T$']
     """
     certificate = subject if certifies_family(subject) else certificate_of(subject)
-    late, tracking, x0 = certificate.late, certificate.tracking, certificate.initial_state
+    late, tracking, x0 = certificate.proof.late, certificate.proof.tracking, certificate.initial_state
     late = late if late is not None and late.says_something else None
     if late is None and tracking is None:
         what = "the certificate says nothing of late messages or of leaders that move; certify with "
@@ -71,7 +71,7 @@ def plot_tracking(subject: Any, *, ax: Axes | None = None, time_unit: str = "") 
     ax, T = axes_of(ax), float(certificate.protocol.T)
     t = np.linspace(0, T, 401)
     if not certificate.of_family:
-        if x0 is None or (late is not None and certificate.final_state is None):
+        if x0 is None or (late is not None and certificate.proof.final_state is None):
             raise ParameterError("the certificate has no initial state to run from; certify with x0")
         t = _draw_runs(ax, certificate, late, [float(x) for x in x0])
     if late is not None:
@@ -87,13 +87,13 @@ def plot_tracking(subject: Any, *, ax: Axes | None = None, time_unit: str = "") 
 
 def _draw_runs(ax: Axes, certificate: Certificate, late: LateBounds | None, start: list[float]) -> np.ndarray:
     """Draw the runs of one graph; return their instants."""
-    nodes, ends = certificate.structure.followers, np.asarray(certificate.final_state, dtype=float)
+    nodes, ends = certificate.graph_proof.structure.followers, np.asarray(certificate.proof.final_state, dtype=float)
     if not nodes.size or (
         late is not None and (late.vehicles is not None or late.settling is not None or late.lmi is not None)
     ):
-        nodes = np.arange(certificate.graph.n_nodes)
+        nodes = np.arange(certificate.graph_proof.graph.n_nodes)
     t = np.linspace(0, float(certificate.protocol.T), 401)
-    for run, style in _runs(certificate, late, certificate.tracking, start):
+    for run, style in _runs(certificate, late, certificate.proof.tracking, start):
         aims = ends[:, None] if run.targets is None else run.targets
         ax.plot(run.t, np.abs(run.states - aims)[nodes].max(axis=0), **style)
         t = run.t
@@ -104,7 +104,7 @@ def _runs(
     certificate: Certificate, late: LateBounds | None, tracking: Tracking | None, start: list[float]
 ) -> list[tuple[Trajectory, dict[str, Any]]]:
     """Return the runs that are drawn, and how."""
-    graph, protocol = certificate.graph, certificate.protocol
+    graph, protocol = certificate.graph_proof.graph, certificate.protocol
     if late is not None and late.vehicles is not None:
         seen = certificate.asked_trajectory
         return [] if seen is None else [(seen, {"color": RUN, "linewidth": 1.1, "label": "vehicles"})]

@@ -104,9 +104,10 @@ def _draw_signals(
     ax: Axes, certificate: Certificate, runs: Sequence[Trajectory]
 ) -> tuple[dict[int, str], tuple[float, float]]:
     """Draw runs of a family within what is proved for every signal; return the colours of agents, and the limits."""
-    groups = family_camps(certificate.family)
-    if groups is None or not all(part.component.behaviour == BIPARTITE_CONSENSUS for part in certificate.parts):
-        groups = family_groups(certificate.family)
+    proof = certificate.family_proof
+    groups = family_camps(proof.family)
+    if groups is None or not all(part.component.behaviour == BIPARTITE_CONSENSUS for part in proof.parts):
+        groups = family_groups(proof.family)
     agents, labels = _extreme_agents(runs[0].states[:, 0]), set()
     for k in agents:
         for run in runs:
@@ -137,10 +138,10 @@ def _draw_tubes(
 ) -> list[float]:
     """Shade where the agents of each camp are for every signal; draw the final intervals beyond ``T``, return ends."""
     before = run.remaining > 0
-    moves = certificate.deviation_bound(run.remaining[before])
-    finals = certificate.final_state or ()
+    moves = certificate.proof.deviation_bound(run.remaining[before])
+    finals = certificate.family_proof.final_state or ()
     largest = np.zeros(len(groups))  # what the states of a component never exceed
-    for part in certificate.parts:
+    for part in certificate.family_proof.parts:
         nodes = part.component.nodes
         largest[nodes] = np.abs(run.states[nodes, 0]).max()
         if run.sliding is not None:
@@ -208,7 +209,7 @@ def plot_run(
     upper = new_axes(figure, (2, 1, 1))
     lower = new_axes(figure, (2, 1, 2))
     plot_trajectory(run, ax=upper, time_unit=time_unit)
-    reaching = subject.reaching if reaching is None and isinstance(subject, Certificate) else reaching
+    reaching = subject.proof.reaching if reaching is None and isinstance(subject, Certificate) else reaching
     plot_sliding(run, ax=lower, reaching=reaching, time_unit=time_unit)
     return share_legend(figure, 3 if wide else 2)
 
@@ -253,7 +254,7 @@ def plot_sliding(
     ax = axes_of(ax)
     if (sliding := run.sliding) is None:
         raise ParameterError("the run has no sliding variables; simulate under the sliding-mode protocol")
-    reaching = subject.reaching if reaching is None and isinstance(subject, Certificate) else reaching
+    reaching = subject.proof.reaching if reaching is None and isinstance(subject, Certificate) else reaching
     T_r = float(sliding.protocol.T_r)
     named = draw_agents(ax, run, sliding.sigma, structure)
     reached = sliding.reaching_times[sliding.sigma0 != 0]
