@@ -55,7 +55,9 @@ def compare(
         reason = f"{name} is refused {way}; accepted if {flags} is what you mean"
         found = Compared(reason, {"graph_read": f"{name}, refused {way}: {error}"})
     else:
-        read = {"graph_read": f"{name}, read {way}: {found.facts['graph_read']}"}
+        late = isinstance((pair.document.get("messages") or {}).get("latency"), list)
+        delays = "; delays are the certificate's own, not compared" if late else ""
+        read = {"graph_read": f"{name}, read {way}: {found.facts['graph_read']}{delays}"}
         if found.reason is None:
             return report, found.facts | read
         flags = _flags_that_agree(pair, options)

@@ -29,7 +29,7 @@ import lmi
 from lmi.definiteness_proofs import prove_generalized_margin
 from lmi.dyadic import round_to_bits
 from lmi.errors import LMIError, NoCertificate
-from lmi.sparse_definiteness_proofs import prove_sparse_positive_definite
+from lmi.sparse_definiteness_proofs import SparseDefinitenessProof, prove_sparse_positive_definite
 from lmi.sparse_h_matrix import FILL_ROWS, SparseHMatrix, fill_core
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure
@@ -270,14 +270,32 @@ def _prove_large_group(
         size = abs(half) + abs(half.T) + abs(g) * P
         if basis is not None:
             S, size = sparse.csc_array(basis.T @ S @ basis), sparse.csc_array(abs(basis).T @ size @ abs(basis))
-        # What rounding may have changed in a row is taken off the diagonal, in the scaling in which rows are judged.
-        root = np.sqrt(np.where((own := S.diagonal()) > 0, own, 1.0))
-        spare = _ROUNDING * root * (size @ (1 / root))
-        S = sparse.csc_array((S + S.T) / 2 - sparse.diags_array(spare))
-        factor = prove_sparse_positive_definite(S)
-        if factor is not None:
+        if (factor := _prove_rounded(S, size)) is not None:
             return GroupProof(weights, Fraction(g) * Fraction(2) ** shift, factor, shift, parents)
     raise NoCertificate(f"the rate {guess * unit:.6g} of a leader group of {n} nodes is numerical: it was not proved")
+
+
+def _prove_rounded(S: Any, size: Any) -> SparseDefinitenessProof | None:
+    """Prove every form positive definite that differs from ``S`` by what rounding of entries of ``size`` may change.
+
+    That is taken off the diagonal, in the scaling in which rows are judged: without weights, or with those that a first
+    proof found; a second one may change these by a factor of 2, and twice as much is taken off then.
+    """
+    from scipy import sparse
+
+    root = np.sqrt(np.where((own := S.diagonal()) > 0, own, 1.0))
+    off, judged = _ROUNDING * root * (size @ (1 / root)), np.ones(root.size)
+    for _ in range(2):
+        factor = prove_sparse_positive_definite(sparse.csc_array((S + S.T) / 2 - sparse.diags_array(off)))
+        if factor is None or factor.weights is None:
+            return factor
+        weights = np.empty(root.size)
+        weights[factor.order] = factor.weights
+        change = weights / judged
+        if judged.max() > 1 and change.max() <= 2 * change.min():
+            return factor
+        judged, off = weights, np.maximum(off, 2 * _ROUNDING * (root / weights) * (size @ (weights / root)))
+    return None
 
 
 def _spanning_tree(L: Any) -> np.ndarray:

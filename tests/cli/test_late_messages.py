@@ -200,6 +200,31 @@ def test_followers_track_leaders_that_move_and_the_file_says_so() -> None:
     assert "ever after" in sign.out
 
 
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ("a,b,0,0.9\na,b,-2,0.0001", ("--drop-zeros",)),
+        ("a,b,-2,0.0001\na,b,0,0.9", ("--drop-zeros",)),
+        ("a,b,-2,0.9\na,b,-2,0.0001", ("--duplicates", "last")),
+        ("a,b,0,0.9\na,b,-2,0.9\na,b,-2,0.0001", ("--duplicates", "last", "--drop-zeros")),
+        ("a,b,-2,0.0001\nb,b,1,0.9", ("--drop-self-loops",)),
+    ],
+)
+def test_the_delay_of_a_row_that_was_dropped_is_dropped_with_it(rows: str, words: tuple[str, ...]) -> None:
+    """That of a row of weight 0, or of an earlier row, stayed on the edge, and the wish was refuted."""
+    Path("rows.csv").write_text(f"source,target,weight,delay\nl,a,1,0.0001\n{rows}\n")
+    asked = ("--delay", "delay", "--x0", "l=3,a=-5,b=2", "--max-residual", "1e-3", *QUICK)
+    run = ptcc("certify", "rows.csv", *words, *asked, "-o", "rows.json")
+    assert run.code == 0 and "messages   up to 0.0001 old" in run.out, run
+    lagging = f"source,target,weight_min,weight_max,delay\nl,a,1,1,0.0001\n{rows}\n"
+    lagging = re.sub(r"^([ab],b),(\S+?),", r"\1,\2,\2,", lagging, flags=re.M)
+    Path("lagging.csv").write_text(lagging)
+    if "--duplicates" not in words:
+        assert "up to 0.0001 old" in ptcc("certify", "lagging.csv", *words, "--delay", "delay").out
+    told = " ".join(ptcc("check", "rows.json", "rows.csv", *words).out.split())
+    assert "accepted" in told and "delays are the certificate's own, not compared" in told
+
+
 def test_where_nothing_is_proved_of_moving_leaders_the_screen_says_why() -> None:
     Path("tiny.csv").write_text("l,a,1e-20\na,b,1\nb,a,1\n")
     run = ptcc("certify", "tiny.csv", "--leader-speed", "1", "--x0", "1,2,3", *QUICK)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 from itertools import chain, islice
 
@@ -10,6 +11,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, pairs_of
 from ptcc_certify.graphs.io.edge_list import records
 from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes
+from ptcc_certify.graphs.io.intervals import interval_columns
 from ptcc_certify.graphs.io.signs import find
 from ptcc_certify.graphs.io.table_columns import columns_of, edge_columns
 from ptcc_certify.graphs.rationals import parse_exact, shorten
@@ -60,6 +62,10 @@ def read_delays(path: Source, graph: SignedDigraph | Family, title: str = "delay
         if edge_columns(titles, place) is not None:
             mend = f"add it, or name one of {', '.join(map(shorten, titles))}"
         raise FormatError(f'{place}: no column "{shorten(title)}"; {mend}')
+    low, high, _ = interval_columns(titles, place)
+    weights = [column for column in (ends[2] if low is None else low, high) if column is not None]
+    dropped = "zeros" in graph.read or bool(graph.read.get("drop_zeros"))  # rows of weight 0
+    last = graph.read.get("duplicates") == "last"
     first, second, _ = ends if graph.read.get("orientation") != "listens" else (ends[1], ends[0], None)
     delays: dict[tuple[str, str], Fraction] = {}
     known: dict[str, Fraction] = {}  # many edges, few delays
@@ -68,8 +74,8 @@ def read_delays(path: Source, graph: SignedDigraph | Family, title: str = "delay
             continue
         place, text = f"{name}, line {number}", row[at].strip() if at < len(row) else ""
         source, target = row[first].strip(), row[second].strip()
-        if source == target:
-            continue  # a self-loop that was dropped
+        if source == target or (dropped and weights and all(_is_zero(row, column) for column in weights)):
+            continue  # it was dropped, and its delay with it
         try:
             if text not in known:
                 known[text] = parse_exact(text)
@@ -82,10 +88,17 @@ def read_delays(path: Source, graph: SignedDigraph | Family, title: str = "delay
         if value < 0:
             edge = f"{shorten(source)} -> {shorten(target)}"
             raise FormatError(f"{place}: delay {shorten(text)} of edge {edge} is negative; give a number >= 0")
-        delays[source, target] = max(value, delays.get((source, target), value))
-        if graph.read.get("undirected"):
-            delays[target, source] = max(value, delays.get((target, source), value))
-    if "zeros" in graph.read or "drop_zeros" in graph.read:  # edges of weight 0 were dropped
+        for pair in ((source, target), (target, source))[: 2 if graph.read.get("undirected") else 1]:
+            delays[pair] = value if last else max(value, delays.get(pair, value))
+    if dropped:  # sums that are 0, too
         edges = set(pairs_of(graph))
         delays = {pair: delay for pair, delay in delays.items() if pair in edges}
     return delays
+
+
+def _is_zero(row: Sequence[str], column: int) -> bool:
+    """Tell whether a field is the number 0; a word for a sign is none."""
+    try:
+        return column < len(row) and parse_exact(row[column].strip()) == 0
+    except NumberError:
+        return False

@@ -393,6 +393,7 @@ def read_family(
     named: dict[str, Family] = {}
     ways, notes = dict[str, str](), list[str]()
     missing = set(wanted)
+    record: dict[str, Any] = {}
     for number, path in enumerate(sources, 1):
         dropped = [option for option in _DROPS if options.get(option)]
         rows = _interval_rows(path, orientation or "information", share, undirected, dropped)
@@ -404,12 +405,15 @@ def read_family(
             others = {option: value for option, value in options.items() if option not in _DROPS}
             if any(value != getattr(Reading, option) for option, value in others.items()):
                 raise ParameterError("rows with intervals are not merged; mend them in the file")
-            nodes, edges, note = rows
-            notes += [note] if note else []
+            nodes, edges, left_out = rows
+            told = " and ".join(counted(left_out[kind], kind) for kind in sorted(left_out, reverse=True))
+            notes += [f"{shorten(name_and_ending(path)[0])}: {told} dropped"] if left_out else []
             both = [{*_both(edge[:2], undirected)} for edge in edges]
             off = set(wanted) & set[tuple[str, str]]().union(*both)
             edges = [(*e[:2], *may_fail(*e[2:])) if off & pairs else e for e, pairs in zip(edges, both, strict=True)]
             named[name] = Family.from_intervals(edges, nodes, undirected=undirected)
+            how = Reading(orientation=orientation, undirected=undirected, **options)
+            record = how.record(False, left_out[LOOP], left_out[ZERO]) | {"notes": tuple(notes)}
         else:
             graph = read_graph(path, orientation=orientation, undirected=undirected, **options)
             if orientation is None and name_and_ending(path)[1] not in MATRICES:
@@ -432,6 +436,8 @@ def read_family(
     read = {"orientation": orientation, "undirected": undirected, **options}
     read |= {"uncertainty": format_exact(share), "optional": [list(pair) for pair in wanted]}
     family = Family.switching(named)
+    if record and family.graph is not None:  # one file with intervals, in which all weights are known
+        family.graph.read.update(record)
     again_given = _given_again([str(path) for path in sources], [*named])
     return replace(family, read=read, notes=(*family.notes, *again_given, *notes))
 
@@ -513,6 +519,8 @@ def is_family_file(path: Source) -> bool:
 
 #: Options that leave rows with intervals out.
 _DROPS = ("drop_self_loops", "drop_zeros")
+#: What they leave out.
+LOOP, ZERO = "self-loop", "row of weight 0"
 
 
 class _FamilyTable(NamedTuple):
@@ -545,8 +553,8 @@ def _family_table(path: Source) -> _FamilyTable | None:
 
 def _interval_rows(
     path: Source, orientation: str, share: Fraction, undirected: bool, dropped: Collection[str]
-) -> tuple[list[str], list[Interval], str] | None:
-    """Return nodes and rows of an edge list whose header names intervals or optional edges, and what was dropped.
+) -> tuple[list[str], list[Interval], Counter[str]] | None:
+    """Return nodes and rows of an edge list whose header names intervals or optional edges, and how many were dropped.
 
     None of other files.
     """
@@ -601,21 +609,19 @@ def _interval_rows(
                 mend = "--undirected makes each row both directions; keep one, or leave out --undirected"
             raise FormatError(f"{where}: second row for edge {_text(edge)} (the first is line {again[0]}); {mend}")
         rows[edge[:2]] = number, edge
-    dropped_rows = " and ".join(counted(left_out[kind], kind) for kind in sorted(left_out, reverse=True))
-    note = f"{shorten(name)}: {dropped_rows} dropped" if left_out else ""
-    return list(nodes), [row for _, row in rows.values()], note
+    return list(nodes), [row for _, row in rows.values()], left_out
 
 
 def _kind_to_drop(entry: Entry, where: str, dropped: Collection[str]) -> str | None:
     """Return what a row is that an option drops, and refuse it without that option; None of every other row."""
     if entry.source == entry.target:
         if "drop_self_loops" in dropped:
-            return "self-loop"
+            return LOOP
         mend = "remove it, or drop all with --drop-self-loops"
         raise FormatError(f"{where}: self-loop at node {shorten(entry.source)}; {mend}")
     if entry.always_zero:
         if "drop_zeros" in dropped:
-            return "row of weight 0"
+            return ZERO
         raise FormatError(f"{entry.place}: its weight is always 0; remove it, or drop all with --drop-zeros")
     return None
 
