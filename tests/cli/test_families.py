@@ -358,6 +358,12 @@ def test_rows_with_intervals_that_are_always_zero_and_self_loops_are_dropped_whe
     assert ptcc("check", "i.json", "same.csv").code == 0
 
 
+def test_a_header_of_intervals_in_another_order_is_said_to_be_read(folder):
+    for weights, said in (("1,2", "i.csv: columns by header"), ("2,2", "columns by header: information flows")):
+        Path("i.csv").write_text(f"target,source,min,max\na,b,{weights}\nb,a,{weights}\n")
+        assert said in " ".join(ptcc("certify", "i.csv").out.split())
+
+
 BAD = {
     "least above largest": (_rows("a,b,2,1"), (), "bad.csv, line 2: edge a -> b: the least weight 2 is above"),
     "always zero": (_rows("a,b,0,0"), (), "line 2: edge a -> b: its weight is always 0"),
@@ -380,7 +386,16 @@ BAD = {
     "loop": (_rows("a,a,1,2"), (), "self-loop at node a"),
     "no source": (_rows(",b,1,2"), (), "the source is empty"),
     "no rows": (_rows(), (), "bad.csv: no edge and no node"),
-    "sum of intervals": (_rows("a,b,1,2"), ("--duplicates", "sum"), "rows with intervals are not merged"),
+    "sum of intervals": (
+        _rows("a,b,1,2"),
+        ("--duplicates", "sum"),
+        "--duplicates is not for rows with intervals, which are not merged",
+    ),
+    "columns of intervals": (
+        _rows("a,b,1,2"),
+        ("--columns", "1,2,3"),
+        "--columns is not for rows with intervals, which are",
+    ),
     "interval and share": (_rows("a,b,1,2"), ("--uncertainty", "1%"), "gives intervals itself"),
     "other nodes": ("a,b,1", ("day.csv", "--switching"), "mode bad has no node c, which another mode has"),
     "not switching": ("a,b,1", ("day.csv",), "2 graphs; add --switching"),

@@ -402,10 +402,12 @@ def read_family(
         while name in named:  # no mode may take the place of another
             name, again = f"{stem} ({again})", again + 1
         if rows is not None:
-            others = {option: value for option, value in options.items() if option not in _DROPS}
-            if any(value != getattr(Reading, option) for option, value in others.items()):
-                raise ParameterError("rows with intervals are not merged; mend them in the file")
-            nodes, edges, left_out = rows
+            for option, value in options.items():
+                if option not in _DROPS and value != getattr(Reading, option):
+                    why = "are not merged" if option == "duplicates" else "are read by their header"
+                    raise ParameterError(option, f"is not for rows with intervals, which {why}; leave it out")
+            nodes, edges, left_out, by_header = rows
+            notes += [f"{shorten(name_and_ending(path)[0])}: {BY_HEADER}, whatever their order"] if by_header else []
             told = " and ".join(counted(left_out[kind], kind) for kind in sorted(left_out, reverse=True))
             notes += [f"{shorten(name_and_ending(path)[0])}: {told} dropped"] if left_out else []
             both = [{*_both(edge[:2], undirected)} for edge in edges]
@@ -413,7 +415,7 @@ def read_family(
             edges = [(*e[:2], *may_fail(*e[2:])) if off & pairs else e for e, pairs in zip(edges, both, strict=True)]
             named[name] = Family.from_intervals(edges, nodes, undirected=undirected)
             how = Reading(orientation=orientation, undirected=undirected, **options)
-            record = how.record(False, left_out[LOOP], left_out[ZERO]) | {"notes": tuple(notes)}
+            record = how.record(False, left_out[LOOP], left_out[ZERO]) | {"notes": (BY_HEADER,) * by_header}
         else:
             graph = read_graph(path, orientation=orientation, undirected=undirected, **options)
             if orientation is None and name_and_ending(path)[1] not in MATRICES:
@@ -553,15 +555,15 @@ def _family_table(path: Source) -> _FamilyTable | None:
 
 def _interval_rows(
     path: Source, orientation: str, share: Fraction, undirected: bool, dropped: Collection[str]
-) -> tuple[list[str], list[Interval], Counter[str]] | None:
-    """Return nodes and rows of an edge list whose header names intervals or optional edges, and how many were dropped.
+) -> tuple[list[str], list[Interval], Counter[str], bool] | None:
+    """Return nodes and rows of an edge list whose header names intervals or optional edges; None of other files.
 
-    None of other files.
+    Also how many rows were dropped, and whether sources stand elsewhere than in the first column.
     """
     if (table := _family_table(path)) is None:
         return None
     name, data, header, ends, columns, below = table
-    low = columns[0]
+    low, by_header = columns[0], ends[0] > 0
     ends = ends if orientation == "information" else (ends[1], ends[0], ends[2])
     if low is None and ends[2] is None:
         raise FormatError(f"{name}: the header names no weight; name a column weight, or weight_min and weight_max")
@@ -609,7 +611,7 @@ def _interval_rows(
                 mend = "--undirected makes each row both directions; keep one, or leave out --undirected"
             raise FormatError(f"{where}: second row for edge {_text(edge)} (the first is line {again[0]}); {mend}")
         rows[edge[:2]] = number, edge
-    return list(nodes), [row for _, row in rows.values()], left_out
+    return list(nodes), [row for _, row in rows.values()], left_out, by_header
 
 
 def _kind_to_drop(entry: Entry, where: str, dropped: Collection[str]) -> str | None:

@@ -48,11 +48,8 @@ def rate_facts(certificate: Certificate) -> Facts:
     if bound is not None and spectral is not None and bound > Fraction(spectral) * Fraction(101, 100):
         limit += f" ({spectral:.6g}, numerical)"
     if rate is None:
-        numerical = (
-            ""
-            if certificate.observed.numerical_rate is None
-            else f"numerically {certificate.observed.numerical_rate:.6g}"
-        )
+        seen = certificate.observed.numerical_rate
+        numerical = "" if seen is None else f"numerically {seen:.6g}"
         note = "; ".join(filter(None, ("not proved", numerical, limit)))
         yield Fact(head="rate", standing="unproved", note=note, detail=True)
         return
