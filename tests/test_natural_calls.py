@@ -122,6 +122,7 @@ ENGINEER = {
     "ptcc.GainLimits(gain_cap=50)": "GainLimits(gain_cap=50)",
     "ptcc.simulate(g, p, x0, actuator=ptcc.GainLimits(gain_cap=50), times=[0, 1])": "Trajectory(3 agents",
     "ptcc.certify(g, p, x0, limits=[ptcc.GainLimits(50)], asks=fast).effort.residual[0].agents is None": "False",
+    "ptcc.certify(g, p, x0, limits=None, asks=fast).verdict": "certified",
     "ptcc.certify(g, p, x0, limits=ptcc.GainLimits(gain_cap=50), asks=fast).effort.residual[0].agents is None": "False",
     "ptcc.certify(g, p, asks=ptcc.Asks(initial_set=3, simulation=False)).effort.bounded": "True",
     "ptcc.certify(g, p, asks=ptcc.Asks(initial_set=ptcc.box([0] * 3, [1] * 3))).effort.bounded": "True",

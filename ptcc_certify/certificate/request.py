@@ -191,10 +191,8 @@ def read_seconds(time_limit: Any, graph: Sized) -> float:
     return seconds
 
 
-def _limits(entry: Any, protocol: Protocol) -> GainLimits:
+def _limits(entry: Limits, protocol: Protocol) -> GainLimits:
     """Return limits of the gain, or refuse them."""
-    if not isinstance(entry, Limits):
-        raise ParameterError(f"limits holds {shorten(repr(entry))}; give GainLimits(gain_cap=50), say")
     limits = GainLimits(entry.gain_cap, entry.stop_before, entry.sample_period)
     if limits.ideal:
         raise ParameterError(

@@ -15,7 +15,7 @@ from click.core import ParameterSource
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.agents import agents_and_states, exchanges_virtual
 from ptcc_certify.cli.declared import SIGNAL, click_option, flag_of, options_asking, options_for, together
-from ptcc_certify.cli.messages import asks_for_leaders, asks_for_messages, leaders_of, messages_of
+from ptcc_certify.cli.messages import asks_for_leaders, asks_for_messages, leaders_of, messages_of, noted_delays
 from ptcc_certify.cli.scenario import scenario_record
 from ptcc_certify.cli.terminal import LOG, Screen, in_flags, print_json, progress
 from ptcc_certify.errors import ExitCode, ParameterError, one_line
@@ -143,7 +143,7 @@ def read_graph_or_family(graphs: tuple[str, ...], options: shared.Options) -> Si
 def graph_or_family(files: Sequence[Any], options: shared.Options) -> SignedDigraph | Family:
     """Return the family of files, read as the options say, or the graph where there is one, with known weights."""
     from ptcc_certify.graphs.io import read_family
-    from ptcc_certify.graphs.io.graph_files import is_family_file
+    from ptcc_certify.graphs.io.interval_rows import is_family_file
 
     uncertain = options["uncertainty"] is not None or options["optional"]
     if len(files) == 1 and not uncertain and not is_family_file(files[0]):
@@ -276,7 +276,7 @@ def certify_family(
         asks = Asks(time_limit=options["time_limit"], expectations=expected)
         beside: dict[str, Any] = {"messages": messages_of(graphs, family, options), "leaders": leaders_of(options)}
         if beside["messages"] is not None and isinstance(beside["messages"].delay, Mapping):
-            family = replace(family, notes=(f'delays of column "{options["delay"]}"', *family.notes))
+            family = replace(family, notes=noted_delays(family.notes, options["delay"]))
         agents, begun = agents_and_states(options, family.modes[0].mandatory, certified=True)
         beginning = InitialState(x0, sigma0) if begun is None else replace(begun, sigma0=sigma0)
         case = Case(family, protocol, beginning, signal=signal, agents=agents, asks=asks, **beside)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING
@@ -117,17 +117,25 @@ def _delay(
         for pair, delay in read_delays(graph_file(graph), signed, text).items():
             delays[pair] = max(delay, delays.get(pair, delay))
     if isinstance(signed, SignedDigraph):
-        signed.read["notes"] = (f'delays of column "{text}"', *_without(signed.read["notes"], text))
+        signed.read["notes"] = noted_delays(signed.read["notes"], text)
     return delays
 
 
-def _without(notes: Iterable[str], title: str) -> Iterator[str]:
-    """Leave a column that is read out of the note on columns that are ignored."""
+def noted_delays(notes: Iterable[str], title: str) -> tuple[str, ...]:
+    """Return notes on how files were read that say that delays were read of a column, and not that it is ignored.
+
+    Examples
+    --------
+    >>> noted_delays(['columns ignored: "lag", "year"', 'a.csv: columns ignored: "lag"'], "lag")
+    ('delays of column "lag"', 'columns ignored: "year"')
+    """
+    told = [f'delays of column "{title}"']
     for note in notes:
-        head, _, names = note.partition("columns ignored: ")
+        head, ignored, names = note.partition("columns ignored: ")
         left = [name for name in names.split(", ") if name.strip('"').lower() != title.lower()]
-        if head or left:
-            yield note if head else f"columns ignored: {', '.join(left)}"
+        if left or not ignored:
+            told.append(f"{head}{ignored}{', '.join(left)}")
+    return tuple(told)
 
 
 def leaders_of(options: Options) -> MovingLeaders | None:

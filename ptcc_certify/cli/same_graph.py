@@ -92,7 +92,8 @@ class _Pair:
         from ptcc_certify.certificate.section_writer import read_side_files
         from ptcc_certify.graphs.difference import difference
         from ptcc_certify.graphs.family import Family
-        from ptcc_certify.graphs.io.graph_files import family_flags, reading_flags
+        from ptcc_certify.graphs.io.family_files import family_flags
+        from ptcc_certify.graphs.io.graph_files import reading_flags
 
         graph = graph_or_family(self.files, options)
         if isinstance(graph, Family):
@@ -109,7 +110,7 @@ class _Pair:
         from ptcc_certify.certificate.graph_sections import certificate_family
         from ptcc_certify.certificate.section_writer import read_side_files
         from ptcc_certify.graphs.difference import family_difference, mode_order
-        from ptcc_certify.graphs.io.graph_files import family_flags, read_family
+        from ptcc_certify.graphs.io.family_files import family_flags, read_family
 
         meant = certificate_family(self.document["graph"], read_side_files(self.document, self.folder))
         family = read_family(self.files, **family_keywords(options))
@@ -127,7 +128,8 @@ class _Pair:
 
     def options_of_sender(self) -> dict[str, Any]:
         """Return how the certificate says that its graph was read, as options; nothing where it tells anything else."""
-        from ptcc_certify.graphs.io.graph_files import keywords_as, keywords_of
+        from ptcc_certify.graphs.io.family_files import keywords_of
+        from ptcc_certify.graphs.io.graph_files import keywords_as
 
         if self.kind == "family":
             keywords = keywords_of(self.document["unverified"].get("read"))
@@ -172,8 +174,9 @@ def _flags_that_agree(pair: _Pair, options: shared.Options) -> str | None:
 
 def _flags(options: shared.Options, told: shared.Options, file: Any) -> str:
     """Return what makes other options of these."""
+    from ptcc_certify.graphs.io.family_files import percent
     from ptcc_certify.graphs.io.files import name_and_ending
-    from ptcc_certify.graphs.io.graph_files import MATRICES, percent
+    from ptcc_certify.graphs.io.graph_files import MATRICES
 
     direction = "listens" if name_and_ending(file)[1] in MATRICES else "information"
     words = []

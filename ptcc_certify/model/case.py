@@ -59,7 +59,8 @@ class Case:
 
     def __post_init__(self) -> None:
         initial = self.initial if isinstance(self.initial, InitialState) else InitialState(self.initial)
-        limits = tuple(self.limits) if isinstance(self.limits, Iterable) else (self.limits,)
+        limits = () if self.limits is None else self.limits
+        limits = tuple(limits) if isinstance(limits, Iterable) and not isinstance(limits, str) else (limits,)
         asks = Asks() if self.asks is None else self.asks
         for name, value in {"initial": initial, "limits": limits, "asks": asks}.items():
             object.__setattr__(self, name, value)
@@ -71,6 +72,9 @@ class Case:
             if (value := getattr(self, name)) is not None and not isinstance(value, kind):
                 mend = f"give {kind.__name__}({example}), say"
                 raise ParameterError(name, f"= {shorten(repr(value))} is none; {mend}")
+        for entry in limits:
+            if not isinstance(entry, Limits):
+                raise ParameterError(f"limits holds {shorten(repr(entry))}; give GainLimits(gain_cap=50), say")
 
     @property
     def sliding(self) -> bool:

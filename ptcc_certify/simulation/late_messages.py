@@ -222,10 +222,10 @@ def _least_age(graph: SignedDigraph, messages: LateMessages) -> float:
 
 def _heard_at_once(graph: SignedDigraph, messages: LateMessages) -> np.ndarray:
     """Return the edges over which followers hear at once."""
-    latencies = messages.latencies(graph)
-    if not isinstance(latencies, tuple) or messages.held or messages.own_delay:
+    if messages.held or messages.own_delay:
         return np.arange(0)
-    return np.flatnonzero(np.isin(graph.target, analyse(graph).followers) & (np.array(latencies, dtype=float) == 0))
+    latencies = np.array(messages.latencies(graph), dtype=float)  # of every edge, or one of all
+    return np.flatnonzero(np.isin(graph.target, analyse(graph).followers) & (latencies == 0))
 
 
 def _grid(T: float, age: float, least: float, steps: int, share: float) -> np.ndarray:

@@ -204,7 +204,7 @@ def run_of_vehicles(
 ) -> Trajectory | None:
     """Return a run of vehicles whose messages are as late as allowed, up to ``T`` or past it.
 
-    None where delays are too short for a run, or messages exact while leaders move.
+    None where delays are too short for a run.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ def run_of_vehicles(
     if messages.exact and leaders is None:
         actuator = None if cap is None else GainLimits(gain_cap=cap)
         run = simulate(graph, protocol, x0, samples=_SAMPLES, actuator=actuator)
-    elif messages.exact or not can_run(protocol, messages):
+    elif not can_run(protocol, messages):
         return None
     else:
         run = simulate_late(graph, protocol, messages, x0, leaders=leaders)

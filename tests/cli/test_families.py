@@ -352,16 +352,44 @@ def test_rows_with_intervals_that_are_always_zero_and_self_loops_are_dropped_whe
         and "--drop-self-loops" in ptcc("certify", "i.csv", dropped[0]).err
     )
     run = ptcc("certify", "i.csv", *dropped, "-o", "i.json", "-v")
-    assert run.code == 0 and "i.csv: 1 self-loop and 1 row of weight 0 dropped" in " ".join(run.out.split())
+    assert run.code == 0 and "1 self-loop and 1 row of weight 0 dropped" in " ".join(run.out.split())
     assert ptcc("check", "i.json", "i.csv", *dropped).code == 0
     Path("same.csv").write_text(_rows("a,b,1,2", "c,a,-2,-1"))
     assert ptcc("check", "i.json", "same.csv").code == 0
 
 
 def test_a_header_of_intervals_in_another_order_is_said_to_be_read(folder):
-    for weights, said in (("1,2", "i.csv: columns by header"), ("2,2", "columns by header: information flows")):
+    for weights, said in (("1,2", "columns by header"), ("2,2", "columns by header: information flows")):
         Path("i.csv").write_text(f"target,source,min,max\na,b,{weights}\nb,a,{weights}\n")
         assert said in " ".join(ptcc("certify", "i.csv").out.split())
+
+
+def test_columns_of_intervals_that_are_not_read_are_named_and_a_column_of_delays_where_none_is_asked_for(folder):
+    Path("i.csv").write_text("source,target,min,max,lag,year\na,b,1,2,0.1,1999\nb,c,1,2,0.1,2000\n")
+    told = " ".join(ptcc("certify", "i.csv").out.split())
+    assert 'columns ignored: "lag", "year"' in told
+    told = " ".join(ptcc("certify", "i.csv", "--delay", "lag", "--gain-cap", "5").out.split())
+    assert 'delays of column "lag"; columns ignored: "year"' in told
+    Path("j.csv").write_text("a,b,1\nb,a,1\n")
+    told = " ".join(ptcc("certify", "i.csv", "j.csv", "--switching").out.split())
+    assert 'i: columns ignored: "lag", "year"' in told and "j: " not in told
+
+
+def test_all_that_is_wrong_with_rows_of_intervals_is_one_message(folder):
+    rows = "a,b,1,2", "a,a,1,2", "b,c,0,0", "c,c,1,2", "b,c,3,2", ",c,1,2", "a,b,1,2", "b,d,x,1"
+    Path("bad.csv").write_text(_rows(*rows))
+    run = ptcc("certify", "bad.csv", "--undirected")
+    assert run.code == 2 and run.err.count("\n") == 1
+    for part in (
+        "line 3: self-loop at node a (2 in all); line 4: edge b -> c: its weight is always 0; line 6: edge b -> c: the",
+        "line 7: the source is empty; line 8: second row for edge a -> b (the first is line 2)",
+        "is above the largest (2 in all)",
+        "mend these, or all but line 6, line 7, line 8 with --drop-self-loops --drop-zeros",
+    ):
+        assert part in run.err, run.err
+    Path("bad.csv").write_text(_rows("a,b,1,2", "a,a,1,2", "b,c,0,0"))
+    assert "mend these, or read it with --drop-self-loops --drop-zeros" in (run := ptcc("certify", "bad.csv")).err
+    assert ptcc("certify", "bad.csv", "--drop-self-loops", "--drop-zeros").code == 0
 
 
 BAD = {

@@ -771,6 +771,26 @@ def test_vehicles_that_exchange_virtual_positions_are_certified_checked_drawn_an
     assert family.code == 0 and "for every signal, of virtual positions" in " ".join(family.out.split())
 
 
+def test_the_page_of_vehicles_that_hear_at_once_draws_them_with_leaders_that_move():
+    asked = (*QUICK, *START, *VEHICLES, "--leader-speed", "0.5", "--gain-cap", "20")
+    assert ptcc("certify", "team.csv", *asked, "-o", "c.json").code == 0
+    assert ptcc("report", "c.json", "-o", "c.html").code == 0
+    page = Path("c.html").read_text()
+    assert "states and input are those of a run with what was asked: vehicles, gain at most 20, leaders move" in page
+    assert "under the proved bound, however leaders move within their speed" in page and "however old" not in page
+    assert "late messages: at most" not in page
+
+
+def test_what_is_proved_at_the_deadline_alone_is_drawn():
+    Path("rate.csv").write_text("source,target,weight,delay\nann,bob,2,0.01\nbob,eve,-1,0.02\neve,bob,-3,0.01\n")
+    asked = ("--delay", "delay", "--x0", "1,0,2", "--gain-cap", "40", "--no-simulation")
+    assert ptcc("certify", "rate.csv", *asked, "-o", "c.json").code == 0
+    made = read_certificate("c.json")
+    lines = {line.get_label(): line.get_ydata() for line in made.plot("late").lines}
+    assert lines["proved at $T$"] == made.late.largest < lines["proved bound"][-1]
+    assert lines["as late as allowed"][-1] <= made.late.largest
+
+
 @pytest.mark.parametrize("command", ["design", "plot"])
 def test_what_is_not_built_of_vehicles_is_refused(command: str):
     more = {"design": ("--max-input", "10", "--shortest-deadline"), "plot": ("--what", "decay", "-o", "a.png")}

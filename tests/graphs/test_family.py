@@ -16,7 +16,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import as_family, read_family
 from ptcc_certify.graphs.io.conversion import is_family
-from ptcc_certify.graphs.io.graph_files import keywords_of
+from ptcc_certify.graphs.io.family_files import keywords_of
 from tests.families import KINDS, random_family
 
 GRAPH = SignedDigraph.from_edges([("a", "b", 2), ("b", "c", -3)])

@@ -5,8 +5,9 @@ rows and builds the graph; so a rule of the reader holds for all formats, and a 
 """
 
 from ptcc_certify.graphs.io.conversion import as_family, as_graph
+from ptcc_certify.graphs.io.family_files import read_family
 from ptcc_certify.graphs.io.files import write_atomically
-from ptcc_certify.graphs.io.graph_files import read_family, read_graph, write_graph
+from ptcc_certify.graphs.io.graph_files import read_graph, write_graph
 from ptcc_certify.graphs.io.initial_state import as_state, as_states, by_label, in_node_order, random_states, read_state
 
 __all__ = [

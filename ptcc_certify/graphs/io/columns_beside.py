@@ -11,6 +11,8 @@ from ptcc_certify.errors import NumberError
 from ptcc_certify.graphs.io.signs import DIRECTIONS, plain, sign_of_word
 from ptcc_certify.graphs.rationals import MINUS, parse_exact, shorten
 
+#: How a note begins of columns that are not read.
+IGNORED = "columns ignored"
 #: Different values of a column up to which it may hold signs; of one with more, only a negative number counts.
 _MOST = 1000
 _NO, _YES = ("false", "no", "0", "f", "n", "0.0"), ("true", "yes", "1", "t", "y", "1.0")
@@ -129,6 +131,22 @@ def signs_beside_intervals(columns: Iterable[Column], weights: Iterable[Any]) ->
             mend = "write signs into the weights or both ends of the intervals, and leave the column out"
             return f'column "{shorten(column.title)}" holds {shorten(what.value)} beside the weights; {mend}'
     return ""
+
+
+def notes_on_ignored(columns: Iterable[Column]) -> tuple[str, ...]:
+    """Note the columns that are not read: first, in full, those that hold or name what may be signs.
+
+    Examples
+    --------
+    >>> notes_on_ignored([column_of("year", ["1999"]), column_of("ally_sign", ["1"])])
+    ('perhaps signs, ignored: "ally_sign"', 'columns ignored: "year"')
+    """
+    columns = list(columns)
+    named = [column for column in columns if verdict(column.title, [*column.values]).named]
+    others = [f'"{shorten(column.title)}"' for column in columns if column not in named]
+    told = [f'"{shorten(column.title)}"' for column in named]
+    notes = (f"perhaps signs, ignored: {', '.join(told)}",) if told else ()
+    return (*notes, f"{IGNORED}: {', '.join(others[:20])}") if others else notes
 
 
 def is_signed(title: str) -> bool:

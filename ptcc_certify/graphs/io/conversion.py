@@ -13,7 +13,9 @@ from ptcc_certify.errors import FormatError, GraphError, ParameterError, did_you
 from ptcc_certify.graphs.digraph import SignedDigraph, graph_of, refuse_networkx
 from ptcc_certify.graphs.family import Family, read_share
 from ptcc_certify.graphs.io.columns_beside import column_of, signs_beside_intervals
-from ptcc_certify.graphs.io.graph_files import is_family_file, read_as, read_family
+from ptcc_certify.graphs.io.family_files import read_family
+from ptcc_certify.graphs.io.graph_files import read_as
+from ptcc_certify.graphs.io.interval_rows import is_family_file
 from ptcc_certify.graphs.io.intervals import TWICE, Entry, interval_columns
 from ptcc_certify.graphs.io.packaged import GRAPHS, file_or_packaged
 from ptcc_certify.graphs.io.rows import Beside, Nodes, Rows, Signs, distinct, rows_of

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NoReturn
 
 import numpy as np
 
 from ptcc_certify.errors import FormatError, GraphError, NumberError
-from ptcc_certify.graphs.io.columns_beside import directions, is_signed, verdict
+from ptcc_certify.graphs.io.columns_beside import directions, is_signed, notes_on_ignored, verdict
 from ptcc_certify.graphs.io.laplacian import Diagonal, diagonal_of, fits_one_node
+from ptcc_certify.graphs.io.problems import Problem, one_message
 from ptcc_certify.graphs.io.rows import DECIMALS, HEADER_MEND, Rows, Signs
 from ptcc_certify.graphs.io.signs import DIRECTIONS, NO_SIGN, sign_of_word
 from ptcc_certify.graphs.rationals import MINUS, as_fraction, nearest_float, parse_exact, shorten
@@ -58,7 +58,7 @@ def edges_of(rows: Rows, name: str, how: Reading) -> Edges:
         draft.tell_zeros(zeros, "weight 0")
     if draft.undirected and not how.undirected:
         text = f"{draft.undirected} means undirected edges"
-        draft.problems.append(_Problem(None, text, "let each go both ways with {}", "undirected"))
+        draft.problems.append(Problem("", text, "let each go both ways with {}", "undirected"))
     notes = draft.merge_duplicates()
     draft.refuse_problems()
     source, target, codes = draft.source, draft.target, draft.codes
@@ -66,18 +66,13 @@ def edges_of(rows: Rows, name: str, how: Reading) -> Edges:
         source, target, codes = np.append(source, target), np.append(target, source), np.append(codes, codes)
     labels, rank = ordered_labels(rows.labels)
     read = how.record(rows.matrix, loops.size, zeros.size + draft.cancelled)
-    read["notes"] = (*draft.notes, *rows.notes, *notes, *draft.ignored())
+    read["notes"] = (
+        *draft.notes,
+        *rows.notes,
+        *notes,
+        *notes_on_ignored(c for c in rows.beside.columns if c.title not in draft.read_too),
+    )
     return labels, rank[source], rank[target], Weights(draft.values, codes), read
-
-
-@dataclass(frozen=True)
-class _Problem:
-    """A rule that rows break: the first row, what it says, how it is mended, and the option that mends it."""
-
-    row: int | None
-    text: str
-    mend: str  # {} stands for the option
-    option: str
 
 
 class _Draft:
@@ -86,7 +81,7 @@ class _Draft:
     def __init__(self, rows: Rows, name: str, how: Reading):
         self.rows, self.name, self.how = rows, name, how
         self.notes: tuple[str, ...] = ()
-        self.problems: list[_Problem] = []
+        self.problems: list[Problem] = []
         self.cancelled, self.undirected = 0, rows.undirected
         self.read_too = set[str]()  # titles of columns beside that turned out to be signs
         first, second = np.asarray(rows.first, dtype=np.int64), np.asarray(rows.second, dtype=np.int64)
@@ -158,16 +153,9 @@ class _Draft:
 
     def refuse_problems(self) -> None:
         """Refuse all that rows break in one message, with the options that mend it."""
-        if len(self.problems) == 1:
-            (one,) = self.problems
-            self.fail(self.place(one.row), f"{one.text}; {one.mend.format(self.call(one.option))}")
         if self.problems:
-            places = ["" if one.row is None else self.rows.where(one.row) for one in self.problems]
-            texts = [
-                f"{place}: {one.text}" if place else one.text for place, one in zip(places, self.problems, strict=True)
-            ]
-            options = self.call(*(one.option for one in self.problems))
-            self.fail(self.name, f"{'; '.join(texts)}; mend these, or read it with {options}")
+            place, message = one_message(self.problems, self.call)
+            self.fail(", ".join(filter(None, (self.name, place))), message)
 
     # ------------------------------------------------------------------ weights and signs
 
@@ -265,15 +253,6 @@ class _Draft:
                 place = self.place(codes.index(column.values[what.value])) if codes else self.name
                 self.fail(place, f"{text} {mend} throughout{tell}")
 
-    def ignored(self) -> tuple[str, ...]:
-        """Note the columns that are not read: first, in full, those that hold or name what may be signs."""
-        left = [column for column in self.rows.beside.columns if column.title not in self.read_too]
-        named = [column for column in left if verdict(column.title, [*column.values]).named]
-        others = [f'"{shorten(column.title)}"' for column in left if column not in named]
-        told = [f'"{shorten(column.title)}"' for column in named]
-        notes = (f"perhaps signs, ignored: {', '.join(told)}",) if told else ()
-        return (*notes, f"columns ignored: {', '.join(others[:20])}") if others else notes
-
     def multiply(self, signs: Signs) -> None:
         """Multiply weights that tell sizes by the signs beside them; refuse signs that say something else."""
         texts = [str(sign).strip() for sign in signs.values]
@@ -290,14 +269,14 @@ class _Draft:
             self.refuse(int(np.argmax(beside == factors.index(int(odd)))), f"{what}; {self.columns_mend()}")
         pairs, which = np.unique(self.codes * len(texts) + beside, return_inverse=True)
         both = [(Fraction(self.values[p // len(texts)]), factors[p % len(texts)]) for p in pairs.tolist()]
-        if any(weight < 0 for weight, _ in both):
+        if negative := any(weight < 0 for weight, _ in both):
             for k, (weight, factor) in enumerate(both):
                 if weight * factor < 0:
                     edge = int(np.argmax(which == k))
                     what = f'weight {weight} of edge {self.edge(edge)} and {factor} in column "{title}" disagree'
                     self.refuse(edge, f"{what}; {self.columns_mend()}")
         self.values, self.codes = [abs(weight) * factor for weight, factor in both], which.astype(np.int64)
-        self.notes += (f'weights times column "{title}"',)
+        self.notes += (f'column "{title}" agrees' if negative else f'weights times column "{title}"',)
 
     def factor(self, text: str, beside: np.ndarray, title: str) -> int:
         """Return the sign that a text stands for, or 0; refuse any other, of the first of the edges ``beside``."""
@@ -362,7 +341,9 @@ class _Draft:
         if rows.size > 1 and self.rows.where(0).startswith("line"):
             mend = "remove these rows"
         text = f"self-loop at node {label}{in_all(rows.size)}"
-        self.problems.append(_Problem(int(rows[0]), text, f"{mend}, or drop all with {{}}", "drop_self_loops"))
+        self.problems.append(
+            Problem(self.rows.where(int(rows[0])), text, f"{mend}, or drop all with {{}}", "drop_self_loops")
+        )
 
     def tell_zeros(self, rows: np.ndarray, what: str) -> None:
         named = ", ".join(self.edge_of_row(row) for row in rows[:5].tolist())
@@ -372,7 +353,7 @@ class _Draft:
         if not self.rows.matrix and values[1:] not in ([], [1]) and set(values) <= {*range(_LARGEST_CODE + 1)}:
             text += f" (are {', '.join(map(str, values))} codes of relations?)"
         mend = "remove it or give a weight, or drop all with {}"
-        self.problems.append(_Problem(int(rows[0]), text, mend, "drop_zeros"))
+        self.problems.append(Problem(self.rows.where(int(rows[0])), text, mend, "drop_zeros"))
 
     def merge_duplicates(self) -> tuple[str, ...]:
         """Tell or merge the rows of one pair (of one unordered pair, if edges go both ways); note how many."""
@@ -391,7 +372,7 @@ class _Draft:
             which = f"{self.edge(second)} (the first is {earlier})" if self.name else self.edge(second)
             text = f"{'second row for edge' if self.name else 'two edges'} {which}{in_all(repeated)}"
             mend = "keep one, or merge with {}"
-            self.problems.append(_Problem(int(self.row[second]), text, mend, "duplicates sum|last"))
+            self.problems.append(Problem(self.rows.where(int(self.row[second])), text, mend, "duplicates sum|last"))
             return ()
         if duplicates == "last":
             if undirected and not self.undirected and not self.rows.in_order:

@@ -31,8 +31,6 @@ _OF_MATRIX = r"[alw]\W?(ij|i,j|kl|k,l|uv|u,v)\W?"
 _NO_TITLE = re.compile(r"nan|na|n/?a|none|null|inf|infinity|true|false|unknown|x|\?*", re.IGNORECASE)
 #: The note of a file whose header puts source and target elsewhere than source first.
 BY_HEADER = "columns by header"
-#: How a note begins of columns that are not read.
-IGNORED = "columns ignored"
 #: The note of a file whose raters were read as those who are heard.
 RATERS = "raters listen? --edges listens"
 

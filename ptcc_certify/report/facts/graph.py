@@ -11,7 +11,8 @@ from lmi.exact.decimal_rounding import counted
 from ptcc_certify.certificate.facts import Fact, Facts
 from ptcc_certify.errors import labelled
 from ptcc_certify.graphs.family import Family, Mode
-from ptcc_certify.graphs.io.table_columns import BY_HEADER, IGNORED
+from ptcc_certify.graphs.io.columns_beside import IGNORED
+from ptcc_certify.graphs.io.table_columns import BY_HEADER
 from ptcc_certify.graphs.structure import ClosedComponent, Structure, analyse
 from ptcc_certify.report.text_layout import (
     TEXT,

@@ -162,7 +162,8 @@ def _peaks(run: Trajectory, certificate: Certificate) -> list[Peak]:
     found = [] if peak is None else [Peak(peak, f"certified peak {up(peak, 4)}{_set_text(run, certificate)}")]
     if late is not None and (largest := largest_late_input(late, certificate.protocol)) is not None:
         whole = ", from within 1 of the final states" if late.relative else ""
-        found.append(Peak(float(largest), f"late messages: at most {up(largest, 4)}{whole}", BOUND))
+        what = "as asked" if late.messages.exact else "late messages"
+        found.append(Peak(float(largest), f"{what}: at most {up(largest, 4)}{whole}", BOUND))
     leads = run.conditions.leaders is not None and run.conditions.messages is None
     tracking = certificate.proof.tracking if leads else None
     if tracking is not None and tracking.input is not None:

@@ -6,6 +6,7 @@ import functools
 import io
 import math
 import re
+import textwrap
 import warnings
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -33,6 +34,8 @@ FIGURES = (".png", ".pdf", ".svg")
 RUN, BOUND, BEHIND = "#0072B2", "#D55E00", "#7F7F7F"
 #: Colour and line of an edge from an ally (+1) or an opponent (-1); no camp has them.
 EDGE_STYLES = {1: ("#117733", "-", "from an ally"), -1: ("#882255", "--", "from an opponent")}
+#: Characters of the title of a legend for an inch of the axes below it.
+_TITLE = 22
 #: Between ticks lie these numbers of units, times a power of ten.
 STEPS = [1, 2, 2.5, 5, 10]
 
@@ -192,6 +195,7 @@ def finished(ax: Axes, x: str, y: str, title: str = "") -> Axes:
     if labels := ax.get_legend_handles_labels()[1]:
         width = ax.get_window_extent().width / ax.figure.dpi
         columns = legend_columns(labels, 1.2 * width, 1 if width < 2.2 else 2 if width < 4 else 3)
+        title = "\n".join(textwrap.wrap(title, max(int(_TITLE * width), 20)))
         ax.legend(
             loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, frameon=False, borderaxespad=0.2, title=title
         )

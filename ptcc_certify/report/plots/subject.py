@@ -172,7 +172,8 @@ def limits_text(run: Trajectory, certificate: Certificate | None) -> str:
     if limits is not None:
         numbers = dict(zip(_LIMITS, (limits.gain_cap, limits.stop_before, limits.sample_period), strict=True))
     numbers |= {} if messages is None else {"messages late by up to": messages.age, "off by": messages.value_error}
-    named = [f"{name} {near(number)}" for name, number in numbers.items() if number]
+    named = ["vehicles"] * run.vehicles
+    named += [f"{name} {near(number)}" for name, number in numbers.items() if number]
     named += [] if leaders is None else [f"leaders move at up to {near(leaders.speed)}"]
     if certificate is not None:
         vehicles = run.vehicles
@@ -185,7 +186,7 @@ def limits_text(run: Trajectory, certificate: Certificate | None) -> str:
             "without noise": forced and certificate.noise,
         }
         named += [text for text, there in absent.items() if there]
-    return ", ".join(named or ["vehicles that track virtual positions"] * run.vehicles)
+    return ", ".join(named)
 
 
 def require_same(run: Trajectory, certificate: Certificate) -> None:

@@ -22,6 +22,8 @@ _RUNS: dict[str, dict[str, Any]] = {
     "oldest": {"color": RUN, "linewidth": 1.1, "label": "as late as allowed"},
     "square": {"color": BEHIND, "linewidth": 0.8, "linestyle": "--", "label": "now late, now not"},
 }
+#: What is proved at ``T`` alone is drawn below this share of what is proved over time.
+_NEARER = 0.9
 #: A lower bound at ``T`` is drawn from this share of the upper one on.
 _SEEN = 1e-3
 
@@ -124,8 +126,12 @@ def _draw_late_bound(ax: Axes, late: LateBounds, t: np.ndarray) -> None:
     """Draw what is proved with late messages, and what is the least that a bound can be."""
     ax.set_yscale("log")
     if late.rows or late.steps is not None or late.settling is not None or late.lmi is not None:
-        ax.plot(t, late.largest_bound(t), color=BOUND, linewidth=1.8, label="proved bound")
-    elif late.form is not None:
+        over_time = late.largest_bound(t)
+        ax.plot(t, over_time, color=BOUND, linewidth=1.8, label="proved bound")
+        nearer = bool(late.largest < _NEARER * over_time[-1])
+    else:
+        nearer = late.form is not None
+    if nearer:  # another proof, which says nothing of what is before T
         ax.plot(t[-1:], [late.largest], marker="_", color=BOUND, markersize=12, label="proved at $T$", linestyle="none")
     if late.missed is not None and late.missed.bound >= _SEEN * late.largest:
         marks: dict[str, Any] = {"marker": "v", "color": BOUND, "linestyle": "none", "markersize": 4, "clip_on": False}
