@@ -357,7 +357,12 @@ class _Hearing:
             change = np.bincount(target, factor * (after - before)[source], minlength=self.n)
             last, after[:] = after.copy(), held + change
             if np.abs(after - last).max() <= _ROUNDING * np.abs(after).max():
-                break
+                return
+        from scipy.sparse import coo_array, eye_array
+        from scipy.sparse.linalg import spsolve
+
+        shares = coo_array((factor, (target, source)), shape=(self.n, self.n)).tocsc()
+        after[:] = spsolve(eye_array(self.n, format="csc") - shares, held - shares @ before)
 
     def sums(self, i: int, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the sums of ``w y`` and, for an own state that is late, of ``|w| x_k`` as it was."""

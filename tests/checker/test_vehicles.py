@@ -256,6 +256,18 @@ def test_the_bound_that_is_drawn_is_above_the_vehicles(cap: int | None, delay: s
     assert (lines["vehicles"] <= lines["proved bound"] * (1 + 1e-6) + 1e-9).all()
 
 
+def test_vehicles_that_hear_at_once_are_on_their_targets_at_the_deadline_however_slowly_they_settle():
+    """A chain in which each agent hears the next one far more than the one before: 100 corrections settle nothing."""
+    heard = [(4, 6), (4, 6), (3, 3), (4, 14), (2, 14), (3, 16), (1, 15), (3, 19), (1, 6)]
+    edges = [("L", "a0", 1), *((f"a{k}", f"a{k + 1}", on) for k, (on, _) in enumerate(heard))]
+    edges += [(f"a{k + 1}", f"a{k}", back) for k, (_, back) in enumerate(heard)]
+    graph, x0 = SignedDigraph.from_edges(edges), [0, *range(1, 11)]
+    made = certify(graph, NominalProtocol(rho2=3, kappa=2), x0, agents=VIRTUAL, leaders=MovingLeaders(speed="0.5"))
+    run = made.asked_trajectory
+    at_T = int(np.argmax(run.remaining == 0))
+    assert np.abs(run.states - run.targets)[:, at_T].max() < 1e-7 < np.abs(run.states - run.targets)[:, at_T - 1].max()
+
+
 def test_vehicles_that_begin_on_their_targets_with_a_velocity_are_bounded():
     graph, initial = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 2)]), InitialState([1, 1, 1], v0=[0, 3, 0])
     limits = GainLimits(gain_cap=20)
