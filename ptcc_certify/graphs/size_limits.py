@@ -18,8 +18,8 @@ SEARCH_NODES = 150
 #: Nodes up to which a certificate comes with a simulated run unasked.
 SIMULATED_NODES = 10_000
 
-#: Agents up to which a report repeats the run unasked, and of every one of which it shows the input.
-REPEATED_NODES, INPUT_NODES = 1000, 100
+#: Agents up to which a report repeats the run unasked, and of every one of which it draws states and input.
+REPEATED_NODES, TRACED_NODES = 1000, 100
 #: Nodes of a graph that a report draws, and up to which it is drawn with nodes and arrows, above as a matrix.
 DRAWN_NODES, LABELLED_NODES = 300, 40
 #: Nodes of a graph that a notebook draws unasked: a layout takes seconds above.

@@ -32,10 +32,11 @@ from lmi.errors import LMIError, NoCertificate
 from lmi.sparse_definiteness_proofs import SparseDefinitenessProof, prove_sparse_positive_definite
 from lmi.sparse_h_matrix import FILL_ROWS, SparseHMatrix, fill_core
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import Dominance, GroupProof, LyapunovBlock, LyapunovFunction
 from ptcc_certify.theorems.composite import prove_connectivity
-from ptcc_certify.theorems.lemmas import EXACT_NODES, dyadic_left_vector, gauge, left_vector
+from ptcc_certify.theorems.lemmas import dyadic_left_vector, gauge, left_vector
 from ptcc_certify.theorems.matrix_arithmetic import diagonal_matrix, symmetric_product
 
 #: Relative deviations of ``t`` below the smallest eigenvalue: the larger, the smaller the overshoot constant.

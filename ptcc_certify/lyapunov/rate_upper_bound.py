@@ -23,9 +23,10 @@ from lmi.dyadic import round_to_bits
 from lmi.exact.decimal_rounding import float_down
 from ptcc_certify.checker.rates import InertiaWitness, MeanWitness
 from ptcc_certify.graphs.rationals import writable
+from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.error_system import rounded_matrix
-from ptcc_certify.theorems.lemmas import EXACT_NODES, component_blocks, single_followers
+from ptcc_certify.theorems.lemmas import component_blocks, single_followers
 from ptcc_certify.theorems.matrix_arithmetic import Matrix, integer_matrix, integer_rows
 
 #: Relative amounts by which ``c`` lies above the smallest real part, one after the other, until the proof succeeds.

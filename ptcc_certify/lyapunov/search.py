@@ -28,12 +28,13 @@ from lmi.errors import LMIError, OutOfTime
 from lmi.matrix_classes import block_columns
 from lmi.search_time import checkpoint, part_of_time, share_of_time
 from ptcc_certify.errors import HypothesisError
+from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.dominance import dominant_functions
 from ptcc_certify.lyapunov.error_system import ErrorSystem, rounded_diagonal, rounded_matrix
 from ptcc_certify.lyapunov.function import LyapunovBlock, LyapunovFunction
 from ptcc_certify.model.asks import METHODS
-from ptcc_certify.theorems.lemmas import EXACT_NODES, laplacian_spectrum, left_vector
+from ptcc_certify.theorems.lemmas import laplacian_spectrum, left_vector
 from ptcc_certify.theorems.matrix_arithmetic import BITS, diagonal_matrix
 
 DIAGONAL = ("perron", "lmi")

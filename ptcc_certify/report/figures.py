@@ -13,7 +13,7 @@ from ptcc_certify.bounds.delay.late_messages import LateBounds
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.exit_code import REFUTED
 from ptcc_certify.errors import ParameterError, SimulationError, gated, labelled
-from ptcc_certify.graphs.size_limits import DRAWN_NODES, EXACT_NODES, INPUT_NODES
+from ptcc_certify.graphs.size_limits import DRAWN_NODES, EXACT_NODES, TRACED_NODES
 from ptcc_certify.model.base import Protocol
 from ptcc_certify.report.notation import set_text
 from ptcc_certify.report.plots.agents_motion import plot_formation, plot_motion
@@ -113,12 +113,12 @@ def draw(
         there["tracking"] = saved.proof.tracking is not None
     if run is not None:
         slid = run.sliding is not None
-        there["states"] = n <= INPUT_NODES and not saved.proof.constant
+        there["states"] = n <= TRACED_NODES and not saved.proof.constant
         there["decay"] = (
             saved.comparison is not None and bool(saved.graph_proof.envelope.functions) and bool(run.error.any())
         )
-        there["sliding"] = slid and not saved.direct and n <= INPUT_NODES
-        there["input"] = n <= INPUT_NODES and (slid or not saved.proof.constant)
+        there["sliding"] = slid and not saved.direct and n <= TRACED_NODES
+        there["input"] = n <= TRACED_NODES and (slid or not saved.proof.constant)
     figures = {name: PLOTS[name](saved).figure for name in wanted if there.get(name)}
     if agents_run is not None and saved.proof.agents is not None:
         figures["motion"] = plot_motion(agents_run)
@@ -142,7 +142,7 @@ def _draw_family(
 ) -> dict[str, Any]:
     """Draw the graphs, runs within what is proved, and counterexamples: as far as there are any."""
     proof = saved.family_proof
-    small = bool(runs) and proof.family.n_nodes <= INPUT_NODES
+    small = bool(runs) and proof.family.n_nodes <= TRACED_NODES
     there = {"graph": proof.family.n_nodes <= DRAWN_NODES, "states": small, "input": small}
     moves = bool(runs) and proof.common and proof.rate is not None
     there["decay"] = moves and bool(proof.deviation_bound([1.0]).max() > 0)

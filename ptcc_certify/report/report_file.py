@@ -15,7 +15,7 @@ from ptcc_certify.certificate.request import listener
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.io.files import refuse_no_path
-from ptcc_certify.graphs.size_limits import INPUT_NODES, REPEATED_NODES
+from ptcc_certify.graphs.size_limits import REPEATED_NODES, TRACED_NODES
 from ptcc_certify.report.figures import draw
 from ptcc_certify.report.page import rejected_html, report_html
 from ptcc_certify.report.plots.runs import sample_runs
@@ -137,7 +137,7 @@ def _write_statement(path: Path, drawn: Mapping[str, Any], latex: Callable[[dict
 def _with_runs(saved: Certificate, simulation: bool | None) -> tuple[Certificate, list[Trajectory], str]:
     """Repeat the run of one graph, or make runs of a family under many signals; return why there is none."""
     n, of_family = len(saved.labels), saved.of_family
-    most, made = (INPUT_NODES, "made") if of_family else (REPEATED_NODES, "repeated")
+    most, made = (TRACED_NODES, "made") if of_family else (REPEATED_NODES, "repeated")
     if simulation is False:
         return saved, [], "it was left out, as was asked"
     if saved.initial_state is None:
@@ -149,7 +149,7 @@ def _with_runs(saved: Certificate, simulation: bool | None) -> tuple[Certificate
     try:
         if of_family:
             return saved, sample_runs(saved), ""
-        return saved.with_simulation(samples=201 if n <= INPUT_NODES else 101), [], ""
+        return saved.with_simulation(samples=201 if n <= TRACED_NODES else 101), [], ""
     except (SimulationError, ParameterError) as error:
         return saved, [], f"it failed: {error}"
     except OverflowError as error:
