@@ -287,16 +287,16 @@ class Evidence(OfQuestion, Shown):
             return None
         try:
             late, tracking = proof.late, proof.tracking
+            if late is not None and not can_run(proof.protocol, late.messages):
+                return None
             start = [float(x) for x in proof.initial_state]
             if late is not None and late.tracking_protocol is not None:
-                from ptcc_certify.simulation.virtual_positions import run_of_vehicles
+                from ptcc_certify.simulation.virtual_positions import follow, run_virtual_positions
 
-                return run_of_vehicles(
-                    proof.graph, proof.protocol, late.tracking_protocol, late.messages, start, late.leaders
-                )
+                assert late.messages.vehicles is not None
+                virtual = run_virtual_positions(proof.graph, proof.protocol, late.messages, start, late.leaders)
+                return follow(virtual, late.tracking_protocol, late.messages.vehicles.v0)
             if late is not None:
-                if not can_run(proof.protocol, late.messages):
-                    return None
                 run: Trajectory = simulate_late(proof.graph, proof.protocol, late.messages, start, leaders=late.leaders)
                 return self._in_places(run)
             if tracking is not None:

@@ -217,16 +217,24 @@ def refuse_dimension(options: Options, command: str) -> None:
         raise ParameterError(f"--dimension: {why}; {mend}")
 
 
-def run_of_agents(case: Case, samples: int) -> AgentsTrajectory:
-    """Run agents of order n with the gains that ``ptcc certify`` proves, from their initial states to the deadline."""
+def run_of_agents(case: Case, samples: int, **pattern: Any) -> AgentsTrajectory:
+    """Run agents of order n with the gains that ``ptcc certify`` proves, from their initial states to the deadline.
+
+    With late messages and moving leaders up to ``T``, messages as old as the ``pattern`` tells.
+    """
     from ptcc_certify.certificate.certification import certify_case
 
     certificate: Any = certify_case(case)
-    if certificate.late is not None and (tracking := certificate.late.tracking_protocol) is not None:
-        from ptcc_certify.simulation.virtual_positions import simulate_vehicles
+    late = certificate.late
+    if late is not None and (tracking := late.tracking_protocol) is not None:
+        from ptcc_certify.simulation import virtual_positions
 
-        begin = [[float(x) for x in values] for values in (certificate.initial_state, certificate.late.vehicles.v0)]
-        return simulate_vehicles(certificate.graph, tracking, *begin, samples=samples)
+        x0, v0 = ([float(x) for x in values] for values in (certificate.initial_state, late.vehicles.v0))
+        if late.messages.exact and late.leaders is None:
+            return virtual_positions.simulate_vehicles(certificate.graph, tracking, x0, v0, samples=samples)
+        beside = certificate.protocol, late.messages, x0, late.leaders
+        run = virtual_positions.run_virtual_positions(certificate.graph, *beside, **pattern)
+        return virtual_positions.follow_in_motion(run, tracking, late.vehicles.v0)
     part = certificate.agents
     if part is None or (case.graph.n_edges and not part.functions):
         raise ParameterError("no gains of these agents are proved; ptcc certify tells why")

@@ -32,7 +32,7 @@ from ptcc_certify.cli.families import (
     refuse_options,
     refuse_restricted,
 )
-from ptcc_certify.cli.messages import leader_options, leaders_of, message_options, messages_of
+from ptcc_certify.cli.messages import asks_for_messages, leader_options, leaders_of, message_options, messages_of
 from ptcc_certify.cli.scenario import BESIDE
 from ptcc_certify.cli.terminal import FIGURES, print_lines, refuse_output
 from ptcc_certify.display import rendered
@@ -100,7 +100,8 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
 
     With late messages (--delay, --period, --packet-loss, --quantisation, --own-delay) one run in which they are as late
     as --pattern tells; with --leader-speed one in which leaders move away from the farthest follower as fast as they
-    may, with columns target(<label>). Both have instants of their own.
+    may, with columns target(<label>). Both have instants of their own, as have vehicles that exchange virtual positions
+    (--agents double-integrator --exchange virtual) with either.
 
     Of a family - several graphs with --switching, weights in intervals, --uncertainty, --optional - one run under one
     signal, with a column mode: the number of the graph that acts.
@@ -108,6 +109,9 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
     from ptcc_certify.graphs.family import Family
 
     suffix, vectors = Path(output or "").suffix.lower(), options["dimension"] > 1
+    given = click.get_current_context().get_parameter_source("age_pattern") is ParameterSource.COMMANDLINE
+    if given and not asks_for_messages(options):
+        raise ParameterError("--pattern says how late messages are; add --delay, --period or --quantisation")
     if suffix not in (*FIGURES, *_TABLES):
         raise ParameterError(f"{output}: CSV is written to .csv, figures to {', '.join(FIGURES)}; choose one of these")
     refuse_output(output)
@@ -121,10 +125,10 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
         raise ParameterError("the sliding-mode protocol is simulated for scalar agents; leave out --dimension")
     places = None if isinstance(signed, Family) else places_of(options, signed, protocol)
     special = special and places is None
-    if special or isinstance(signed, Family):
-        _refuse_messages(options, "families of graphs" if isinstance(signed, Family) else "agents of order n")
-    if special and not isinstance(signed, Family):
-        motion = _run_agents(signed, protocol, options)
+    if isinstance(signed, Family):
+        _refuse_messages(options, "families of graphs")
+    elif special:
+        motion = _run_agents(graph[0], signed, protocol, options)
         _write(motion, output, "agents_motion.plot_motion", {"wide": wide, "time_unit": time_unit})
         if protocol.reaching is not None:
             click.echo("note: u is without the sliding terms, which cancel the disturbance", err=True)
@@ -159,22 +163,32 @@ def _write(run: Any, output: str | None, drawn_by: str, look: dict[str, Any]) ->
         print_lines(f"written    {output}")
 
 
-def _run_agents(signed: SignedDigraph, protocol: Protocol, options: shared.Options) -> AgentsTrajectory:
+def _run_agents(graph: str, signed: SignedDigraph, protocol: Protocol, options: shared.Options) -> AgentsTrajectory:
     """Return the run of agents of order n."""
+    source, asks = click.get_current_context().get_parameter_source, Asks(method=options["method"], simulation=False)
+    beside: dict[str, Any] = {}
+    if exchanges_virtual(options):  # what is asked of these is judged in one place
+        messages, leaders = messages_of((graph,), signed, options), leaders_of(options)
+        limits = [limit for limit in shared.limits_of(options) if limit.stop_before or limit.sample_period]
+        beside = {"messages": messages, "leaders": leaders, "limits": limits}
+        asks = replace(asks, noise=options["noise"], delta=options["delta"] if leaders is None else None)
+        if (messages or leaders) and source("samples") == ParameterSource.COMMANDLINE:
+            raise ParameterError("--samples: these runs have instants of their own; leave it out")
+    else:
+        _refuse_messages(options, "agents of order n")
     for name in ("steps", "boundary_layer"):
         if options[name] is not None:
             mend = f"leave it out, or leave out {agents_flags(options)}"
             raise ParameterError(f"{flag_of(name)}: is for single integrators; {mend}")
-    source = click.get_current_context().get_parameter_source
     if options["kind"] == "nominal" and options["disturbance"] is not None:
         raise ParameterError("--disturbance: agents of order n run without, or under --protocol sliding-mode")
     if source("signal") == ParameterSource.COMMANDLINE:
         raise ParameterError("--signal: is for families of graphs; this is one graph: leave it out")
     refuse_restricted(options)
     agents, initial = agents_and_states(options, signed, certified=exchanges_virtual(options))
-    asks = Asks(method=options["method"], simulation=False)
     begin = replace(initial or InitialState(), sigma0=shared.sigma0_of(protocol, options, signed))
-    return run_of_agents(Case(signed, protocol, begin, agents=agents, asks=asks), options["samples"])
+    case = Case(signed, protocol, begin, agents=agents, asks=asks, **beside)
+    return run_of_agents(case, options["samples"], pattern=options["age_pattern"], seed=options["seed"])
 
 
 def _refuse_messages(options: shared.Options, what: str) -> None:

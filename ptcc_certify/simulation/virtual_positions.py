@@ -20,7 +20,7 @@ from ptcc_certify.graphs.rationals import whole_number
 from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.simulation.agents import MOST_STATES, AgentsTrajectory
 from ptcc_certify.simulation.cvodes import Motion, Phase, Tolerances
-from ptcc_certify.simulation.late_messages import can_run, simulate_late
+from ptcc_certify.simulation.late_messages import simulate_late
 from ptcc_certify.simulation.members import Members
 from ptcc_certify.simulation.run import simulate
 
@@ -125,9 +125,8 @@ def simulate_vehicles(
     e = -(graph.laplacian() @ z)
     u = g**2 * (-a1 * theta * (x - z) - a1 * (w - e) - a2 * (w + a1 * (x - z)))
     moved = np.stack([x, w * g], axis=1)[:, None]
-    clock, told = limits.clock(T * (1 - q), remaining=q), np.full_like(moved, np.nan)
-    tracking: Any = protocol  # nothing of an AgentsProtocol is asked of a run by itself
-    return AgentsTrajectory(graph, tracking, T * (1 - q), q, clock, moved, told, u[:, None], rtol, 0.0)
+    instants = T * (1 - q), q, limits.clock(T * (1 - q), remaining=q)
+    return _motion_of(graph, protocol, instants, moved, u, rtol)
 
 
 def _integrate(
@@ -157,7 +156,13 @@ def _slope(protocol: TrackingProtocol, g: np.ndarray) -> np.ndarray:
 
 
 def follow(run: Trajectory, protocol: TrackingProtocol, v0: Sequence[Fraction]) -> Trajectory:
-    """Return the run of vehicles that track the agents of a run, with their input.
+    """Return the run of vehicles that track the agents of a run, with their input; see :func:`follow_in_motion`."""
+    x, _, u = _followed(run, protocol, v0)
+    return replace(run, states=x, held_input=u, vehicles=True)
+
+
+def follow_in_motion(run: Trajectory, protocol: TrackingProtocol, v0: Sequence[Fraction]) -> AgentsTrajectory:
+    """Return the run of vehicles that track the agents of a run, with velocities and input.
 
     Over a step the virtual positions, and ``r/g``, are taken to change evenly with the clock: of second order.
 
@@ -168,6 +173,22 @@ def follow(run: Trajectory, protocol: TrackingProtocol, v0: Sequence[Fraction]) 
     protocol : TrackingProtocol
     v0 : sequence of N Fraction
     """
+    x, v, u = _followed(run, protocol, v0)
+    moved = np.stack([x, v], axis=1)[:, None]
+    return _motion_of(run.graph, protocol, (run.t, run.remaining, run.clock), moved, u, run.tolerances.rtol)
+
+
+def _motion_of(
+    graph: SignedDigraph, protocol: TrackingProtocol, instants: tuple[Any, Any, Any], moved: Any, u: Any, rtol: float
+) -> AgentsTrajectory:
+    tracking: Any = protocol  # nothing of an AgentsProtocol is asked of a run by itself
+    return AgentsTrajectory(graph, tracking, *instants, moved, np.full_like(moved, np.nan), u[:, None], rtol, 0.0)
+
+
+def _followed(
+    run: Trajectory, protocol: TrackingProtocol, v0: Sequence[Fraction]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return positions, velocities and inputs of vehicles, (N, M) each; NaN where the gain is too large to tell."""
     a1, a2, z, s = float(protocol.a1), float(protocol.a2), run.states, run.clock
     gain = GainLimits(gain_cap=protocol.gain_cap).limit(protocol.gain)
     g = gain.value(run.t, remaining=run.remaining)
@@ -187,43 +208,40 @@ def follow(run: Trajectory, protocol: TrackingProtocol, v0: Sequence[Fraction]) 
         v = r - a1 * g * (x - z)
         u = -a1 * _slope(protocol, g) * (x - z) - a1 * g * (v - run.input) - a2 * g * r
     seen = np.isfinite(u) & ((run.remaining > _NEAREST) | (protocol.gain_cap is not None))
-    u = np.where(seen, u, np.nan)
+    u, v = np.where(seen, u, np.nan), np.where(seen, v, np.nan)
     if run.targets is not None:  # leaders that move as they like send their own positions
         leading = run.graph.in_weight() == 0
-        x[leading], u[leading] = z[leading], 0.0
-    return replace(run, states=x, held_input=u, vehicles=True)
+        x[leading], v[leading], u[leading] = z[leading], run.input[leading], 0.0
+    return x, v, u
 
 
-def run_of_vehicles(
+def run_virtual_positions(
     graph: SignedDigraph,
     protocol: Protocol,
-    tracking: TrackingProtocol,
     messages: LateMessages,
     x0: Sequence[float],
     leaders: MovingLeaders | None = None,
-) -> Trajectory | None:
-    """Return a run of vehicles whose messages are as late as allowed, up to ``T`` or past it.
-
-    None where delays are too short for a run.
+    **pattern: Any,
+) -> Trajectory:
+    """Return a run of what vehicles exchange, whose messages are as late as allowed, up to ``T`` or past it.
 
     Parameters
     ----------
     graph : SignedDigraph
     protocol : Protocol
-        That of the virtual positions.
-    tracking : TrackingProtocol
     messages : LateMessages
         With the vehicles.
     x0 : sequence of N float
     leaders : MovingLeaders, optional
+    **pattern : Any
+        ``pattern`` and ``seed`` of :func:`ptcc_certify.simulation.late_messages.simulate_late`.
+
+    Raises
+    ------
+    ParameterError
+        Delays are too short for a run.
     """
-    cap, vehicles = messages.gain_cap, messages.vehicles
-    assert vehicles is not None
     if messages.exact and leaders is None:
-        actuator = None if cap is None else GainLimits(gain_cap=cap)
-        run = simulate(graph, protocol, x0, samples=_SAMPLES, actuator=actuator)
-    elif not can_run(protocol, messages):
-        return None
-    else:
-        run = simulate_late(graph, protocol, messages, x0, leaders=leaders)
-    return follow(run, tracking, vehicles.v0)
+        actuator = None if messages.gain_cap is None else GainLimits(gain_cap=messages.gain_cap)
+        return simulate(graph, protocol, x0, samples=_SAMPLES, actuator=actuator)
+    return simulate_late(graph, protocol, messages, x0, leaders=leaders, **pattern)

@@ -765,8 +765,18 @@ def test_vehicles_that_exchange_virtual_positions_are_certified_checked_drawn_an
     assert ptcc("plot", "c.json", "--what", "late", "-o", "late.png").code == 0
     assert ptcc("report", "c.json", "-o", "c.html").code == 0
     assert "It moves a virtual position" in Path("c.html").read_text()
-    run = ptcc("simulate", "team.csv", "--rho2", "4", "--kappa", "1", *START, *VEHICLES)
-    assert run.code == 0 and run.out.startswith("t,remaining,a,b,c,d,v(a)")
+    asked = ("simulate", "team.csv", "--rho2", "4", "--kappa", "1", *START, *VEHICLES)
+    for more, lead in (((), [0]), (late, [-0.5]), (("--delay", "0.02", "--pattern", "square"), [0])):
+        run = ptcc(*asked, *more)
+        assert run.code == 0 and run.out.startswith("t,remaining,a,b,c,d,v(a)")
+        rows = run.out.splitlines()
+        assert len(rows) > 100 and [float(x) for x in rows[1].split(",")[2:10]] == [1, 3, 4, -4, *lead, 2, -1, 3]
+    assert ptcc(*asked, *late, "-o", "vehicles.png").code == 0
+    for flag, *value in (("--stop-before", "0.1"), ("--sample-period", "0.1"), ("--noise", "1"), ("--delta", "1")):
+        said = ptcc(*asked, *late, flag, *value)
+        assert said.code == 2 and f"{flag} is not proved yet where virtual positions are exchanged" in said.err
+    assert "have instants of their own" in ptcc(*asked, *late, "--samples", "20").err
+    assert "--pattern says how late messages are" in ptcc(*asked, "--pattern", "square").err
     family = ptcc("certify", "team.csv", *QUICK[:4], *START, *VEHICLES, "--uncertainty", "5%", "--gain-cap", "20")
     assert family.code == 0 and "for every signal, of virtual positions" in " ".join(family.out.split())
 
