@@ -54,9 +54,12 @@ def _pair(context: click.Context, parameter: click.Parameter, texts: Sequence[st
 def _pairs(texts: Sequence[str]) -> tuple[tuple[str, str], ...]:
     pairs = []
     for text in texts:
-        ends = [end.strip() for row in csv.reader([text]) for end in row]
+        try:
+            ends = [end.strip() for row in csv.reader([text], strict=True) for end in row]
+        except csv.Error:
+            ends = []
         if len(ends) != 2 or not all(ends):
-            raise ParameterError(f"--optional: {text} is no edge; write SOURCE,TARGET, such as a,b")
+            raise ParameterError(f"--optional: {shorten(text)} is no edge; write SOURCE,TARGET, such as a,b")
         pairs.append((ends[0], ends[1]))
     return tuple(pairs)
 

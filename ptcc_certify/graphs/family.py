@@ -21,16 +21,16 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import counted
 from ptcc_certify.display import Shown
-from ptcc_certify.errors import GraphError, NumberError, did_you_mean, gated
+from ptcc_certify.errors import GraphError, NumberError, ParameterError, did_you_mean, gated
 from ptcc_certify.graphs.digraph import (
     CallableTuple,
     Exact,
     SignedDigraph,
 )
-from ptcc_certify.graphs.rationals import as_fraction, format_exact, shorten
+from ptcc_certify.graphs.rationals import as_fraction, format_exact, nearest_float, shorten
 from ptcc_certify.graphs.reading import Reading
-from ptcc_certify.graphs.tables import import_pandas, ordered_labels
-from ptcc_certify.graphs.weights import Weights
+from ptcc_certify.graphs.tables import import_pandas, ordered_labels, refuse_unnamed
+from ptcc_certify.graphs.weights import LARGEST_WEIGHT, SMALLEST_WEIGHT, Weights
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -377,6 +377,9 @@ class Family(Shown):
         1 weight of unknown sign was read as two edges that may fail, one of each sign
         """
         Reading(orientation=orientation)  # refuses an unknown one
+        for name, some in (("edges", edges), ("nodes", nodes)):
+            if not isinstance(some, Iterable):
+                raise ParameterError(name, f"= {shorten(repr(some))} are none; give a list")
         rows: list[tuple[Hashable, Hashable, Fraction, Fraction]] = []
         unsure = 0
         for edge in edges:
@@ -403,6 +406,8 @@ class Family(Shown):
         GraphError
             There is none, one is no graph, or two have different nodes: a missing node is not an isolated one.
         """
+        if not isinstance(modes, Iterable):
+            raise ParameterError("modes", f"= {shorten(repr(modes))} are none; give a mapping of names to graphs")
         named = list(modes.items()) if hasattr(modes, "items") else [(str(k), one) for k, one in enumerate(modes, 1)]
         if not named:
             raise GraphError("a family has at least one mode; give one graph or several")
@@ -540,6 +545,11 @@ def read_interval(first: Any, last: Any, place: str) -> tuple[Fraction, Fraction
         least, largest = as_fraction(first, "the least weight"), as_fraction(last, "the largest weight")
     except NumberError as error:
         raise GraphError(f"{place}: {error}; give a number") from None
+    for end in (least, largest):
+        if end and not SMALLEST_WEIGHT <= abs(nearest_float(end)) <= LARGEST_WEIGHT:
+            raise GraphError(
+                f"{place}: weight {format_exact(end)} is outside the range of float64; rescale the weights"
+            )
     if least > largest:
         mend = f"exchange them; a weight from {format_exact(largest)} to {format_exact(least)} has the least first"
         raise GraphError(f"{place}: the least weight {format_exact(least)} is above the largest; {mend}")
@@ -554,6 +564,8 @@ def _parts(edge: Interval) -> list[tuple[Hashable, Hashable, Fraction, Fraction]
         source, target, first, last = edge
     except (TypeError, ValueError):
         raise GraphError(f"edge {shorten(repr(edge))} is not (source, target, least, largest)") from None
+    for node in (source, target):
+        refuse_unnamed(node, f"edge {shorten(str(source))} -> {shorten(str(target))}")
     least, largest = read_interval(first, last, f"edge {shorten(str(source))} -> {shorten(str(target))}")
     zero = Fraction(0)
     if least < 0 < largest:

@@ -90,7 +90,11 @@ class Reading:
                 names = ", ".join(filter(None, choices))
                 raise ParameterError(f'{name} "{shorten(str(value))}" is unknown; use one of {names}')
         for name in _SWITCHES:
-            object.__setattr__(self, name, bool(getattr(self, name)))
+            if isinstance(value := getattr(self, name), str) or value not in (True, False):
+                raise ParameterError(name, f"= {shorten(repr(value))} is neither True nor False")
+            object.__setattr__(self, name, bool(value))
+        if self.laplacian not in (True, False, None) or isinstance(self.laplacian, str):
+            raise ParameterError("laplacian", f"= {shorten(repr(self.laplacian))} is none of True, False, None")
         if self.columns is not None:
             object.__setattr__(self, "columns", joined(self.titles))
 

@@ -66,6 +66,7 @@ class Case:
             object.__setattr__(self, name, value)
         for name, kind, example in (
             ("asks", Asks, 'method="perron"'),
+            ("agents", Agents, "order=2"),
             ("messages", LateMessages, "delay='0.01'"),
             ("leaders", MovingLeaders, "speed=1"),
         ):

@@ -383,8 +383,8 @@ def test_all_that_is_wrong_with_rows_of_intervals_is_one_message(folder):
     for part in (
         "line 3: self-loop at node a (2 in all); line 4: edge b -> c: its weight is always 0; line 6: edge b -> c: the",
         "line 7: the source is empty; line 8: second row for edge a -> b (the first is line 2)",
-        "is above the largest (2 in all)",
-        "mend these, or all but line 6, line 7, line 8 with --drop-self-loops --drop-zeros",
+        'line 9: edge b -> d: "x" is not a number',
+        "mend these, or all but line 6, line 7, line 8, line 9 with --drop-self-loops --drop-zeros",
     ):
         assert part in run.err, run.err
     Path("bad.csv").write_text(_rows("a,b,1,2", "a,a,1,2", "b,c,0,0"))

@@ -652,7 +652,18 @@ def test_signs_of_any_title_in_memory_are_factors_or_refused_and_what_is_not_rea
     ("content", "says"),
     [
         ("source,target,weight_min,weight_max,sign\na,b,1,2,-1\n", 'a column "sign" beside the weights'),
-        ("source,target,weight,sign,optional\na,b,1,-1,yes\n", 'a column "sign" beside the weights'),
+        ("source,target,weight,sign,optional\na,b,1,-1,yes\n", 'column "sign" holds -1 beside the weights'),
+        ("source,target,type,optional\na,b,1,yes\nb,a,2,no\n", 'column "type" holds 2: codes of relations'),
+        ("source,target,min,max,mode\na,b,1,2,inhibits\nb,a,-2,-1,inhibits\n", 'column "mode" holds inhibits'),
+        ("source,target,min,max\na,b,1,2\nb;a;-1;-1\n", "b;a;-1;-1 is one field here"),
+        ("source,target,min,max\na;b;1;2\n", "a;b;1;2 is one field here"),
+        ("source,target,min,max\na,b,1,2\nb a -1 -1\n", "b a -1 -1 is one field here"),
+        ("source,target,min,max\na,b,1,2\n,,5,\n", "line 3: the source is empty"),
+        ("source,target,min,max\na,b,1,2\n,c,,\n", "line 3: the source is empty"),
+        ("source,target,min,max,optional\na,b,1,2,\n,,,,yes\n", "line 3: the source is empty"),
+        ("min,max,source,target\n1,2,a,b\n1,2,b\n", "line 3: the target is empty"),
+        ("source,target,min,max\na,b,1e-320,1\n", "outside the range of float64"),
+        ("source,target,weight,min,max\na,b,3,0,0\n", "its weight is always 0; leave the edge out"),
         ("source,target,weight_min,weight_max,mode\na,b,1,2,inhibits\n", 'column "mode" holds inhibits beside'),
         ("source,target,weight,is_negative,optional\na,b,1,1,yes\n", 'column "is_negative" holds 1 beside'),
         ("source,target,weight,directed,optional\na,b,-1,false,yes\n", 'column "directed" holds false beside'),
@@ -740,6 +751,43 @@ def test_delays_of_a_column_are_those_of_the_edges_that_were_read(tmp_path):
         ("bob", "ann"): Fraction(1, 100),
         ("bob", "eve"): Fraction(1, 50),
     }
+
+
+def test_nodes_that_are_declared_above_the_header_of_intervals_are_read(tmp_path):
+    family = read_family(put(tmp_path, "g.csv", "z\nsource,target,min,max\na,b,1,2\ny\nb,a,1,2\n"))
+    assert sorted(family.labels) == ["a", "b", "y", "z"] and family.modes[0].n_edges == 2
+
+
+@pytest.mark.parametrize("end", [None, float("nan"), "", " "])
+def test_edges_in_memory_whose_ends_have_no_name_are_refused(end: object):
+    pandas = pytest.importorskip("pandas")
+    table = pandas.DataFrame({"source": ["a", end], "target": ["b", "b"], "min": [1, 1], "max": [2, 2]})
+    with pytest.raises(GraphError, match=r"names no node|the source is empty"):
+        ptcc.as_family(table)
+    if not isinstance(end, str):
+        with pytest.raises(GraphError, match="names no node"):
+            ptcc.Family.from_intervals([(end, "b", 1, 2)])
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda file: read_graph(file, undirected="no"),
+        lambda file: read_graph(file, laplacian="no"),
+        lambda file: read_family(file, optional=["ab"]),
+        lambda file: read_family(file, optional="a,b"),
+        lambda file: read_family(file, optional=None),
+        lambda _: read_family(None),
+        lambda _: read_family(3),
+        lambda _: ptcc.Family.switching(None),
+        lambda _: ptcc.Family.from_intervals(None),
+        lambda _: ptcc.Family.from_intervals([("a", "b", 1, 2)], 3),
+        lambda _: ptcc.certify("fig1a", ptcc.NominalProtocol(), agents=ptcc.Agents),
+    ],
+)
+def test_arguments_that_are_none_of_what_is_asked_are_refused(call: Any):
+    with pytest.raises(ParameterError):
+        call(io.StringIO("a,b,1"))
 
 
 @pytest.mark.parametrize("command", ["classify", "certify", "simulate", "design", "plot", "check", "batch", "explore"])

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ptcc_certify.errors import NumberError
-from ptcc_certify.graphs.io.signs import DIRECTIONS, plain, sign_of_word
+from ptcc_certify.graphs.io.signs import DIRECTIONS, is_sign, plain, sign_of_word
 from ptcc_certify.graphs.rationals import MINUS, parse_exact, shorten
 
 #: How a note begins of columns that are not read.
@@ -114,23 +114,46 @@ def verdict(title: str, values: Sequence[str]) -> Verdict:
     return Verdict("", "", signed or bool(negative))
 
 
-def signs_beside_intervals(columns: Iterable[Column], weights: Iterable[Any]) -> str:
+def signs_beside_intervals(columns: Iterable[Column], rows: Iterable[Sequence[Any]]) -> str:
     """Return why a column beside uncertain weights is refused: it may hold their signs; "" if none does.
+
+    Parameters
+    ----------
+    columns : iterable of Column
+    rows : iterable of sequence
+        What is told of the weight of every edge: a weight, or the ends of an interval.
 
     Examples
     --------
-    >>> signs_beside_intervals([column_of("mode", ["inhibits"])], [1, 2]).partition(";")[0]
+    >>> signs_beside_intervals([column_of("mode", ["inhibits"])], [[1, 2]]).partition(";")[0]
     'column "mode" holds inhibits beside the weights'
-    >>> signs_beside_intervals([column_of("mode", ["inhibits"])], [-2, -1])
+    >>> signs_beside_intervals([column_of("mode", ["inhibits"])], [[-2, -1]])
     ''
     """
-    positive = not any(str(weight).strip()[:1] in ("-", MINUS) for weight in weights if str(weight).strip())
+    signs = [{str(x).strip()[:1] in ("-", MINUS) for x in row if x is not None and str(x).strip()} for row in rows]
+    positive = not any(True in told for told in signs)
     for column in columns:
-        what = verdict(column.title, [*column.values])
-        if what.kind and (positive or what.kind in ("directions", "turned")):
+        values = [*column.values]
+        what = verdict(column.title, values)
+        held = is_sign(column.title) and next((x for x in values if DIRECTIONS.get(x.lower()) is not False), "")
+        if not held and what.kind and (positive or what.kind in ("directions", "turned")):
+            held = what.value
+        if not held and what.kind and column.codes is not None:
+            minus = [None if (sign := _sign_of(value)) is None else sign < 0 for value in values]
+            pairs = zip(column.codes, signs, strict=True)
+            held = next((values[k] for k, told in pairs if minus[k] is not None and told == {not minus[k]}), "")
+        if held:
             mend = "write signs into the weights or both ends of the intervals, and leave the column out"
-            return f'column "{shorten(column.title)}" holds {shorten(what.value)} beside the weights; {mend}'
+            return f'column "{shorten(column.title)}" holds {shorten(held)} beside the weights; {mend}'
     return ""
+
+
+def _sign_of(text: str) -> int | None:
+    """Return the sign that a word or 1 and -1 stand for; None of other texts."""
+    if (word := sign_of_word(text)) is not None:
+        return word
+    number = _number(text)
+    return int(number) if number in (1, -1) else None
 
 
 def notes_on_ignored(columns: Iterable[Column]) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from ptcc_certify.graphs.io.columns_beside import column_of, signs_beside_interv
 from ptcc_certify.graphs.io.family_files import read_family
 from ptcc_certify.graphs.io.graph_files import read_as
 from ptcc_certify.graphs.io.interval_rows import is_family_file
-from ptcc_certify.graphs.io.intervals import TWICE, Entry, interval_columns
+from ptcc_certify.graphs.io.intervals import TWICE, Entry, interval_columns, told_weights
 from ptcc_certify.graphs.io.packaged import GRAPHS, file_or_packaged
 from ptcc_certify.graphs.io.rows import Beside, Nodes, Rows, Signs, distinct, rows_of
 from ptcc_certify.graphs.io.signs import OF_EDGES
@@ -321,7 +321,9 @@ def _entries_of_table(table: Any) -> list[Entry] | None:
     ]
     others = [k for k in range(len(names)) if k not in (*ends, low, high, may_fail)]
     beside = [column_of(names[k], table[table.columns[k]]) for k in others]
-    if text := signs_beside_intervals(beside, (weight for column in rest[:3] for weight in column)):
+    if low is None and ends[2] is not None:
+        rest[0] = told_weights(rest[0], names[ends[2]])
+    if text := signs_beside_intervals(beside, zip(*rest[:3], strict=True)):
         raise GraphError(f"the DataFrame: {text}")
     at = [list(table[table.columns[k]]) for k in ends[:2]] + rest
     return [Entry(f"row {row} of the DataFrame", *entry) for row, entry in enumerate(zip(*at, strict=True), 1)]
@@ -335,7 +337,7 @@ def _entries_of_networkx(graph: Any) -> list[Entry] | None:
     edges = [data for *_, data in graph.edges(data=True)]
     titles = dict.fromkeys(str(title) for data in edges for title in data if title not in absent)
     beside = [column_of(title, (data.get(title, "") for data in edges)) for title in titles]
-    if text := signs_beside_intervals(beside, (data.get(title, "") for data in edges for title in [*absent][:3])):
+    if text := signs_beside_intervals(beside, [[data.get(title) for title in [*absent][:3]] for data in edges]):
         raise GraphError(f"the graph: {text}")
     return [
         Entry(f"edge {shorten(str(u))} -> {shorten(str(v))}", u, v, *(data.get(k, absent[k]) for k in absent))

@@ -83,7 +83,9 @@ def _separator(line: str) -> tuple[str | None, bool]:
 
 def _other_separator(line: str) -> bool:
     """Tell whether a row of one field is an edge of another kind of table, such as ``a;b;1`` among commas."""
-    return re.fullmatch(r"[^\t,;]+([\t,;])[^\t,;]+\1\s*[+-]?\d[\d.,/eE+-]*\s*", line) is not None
+    number = r"\s*[+-]?\d[\d.,/eE+-]*\s*"
+    other = rf"[^\t,;]+([\t,;])[^\t,;]+(\1[^\t,;]*)*?\1{number}(\1.*)?"
+    return re.fullmatch(rf"{other}|\s*\S+\s+\S+(\s+[+-]?\d[\d.,/eE+-]*)+\s*", line) is not None
 
 
 def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
@@ -112,7 +114,7 @@ def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
         begin = [row for row in begin if row[0] != started]
     elif table:
         _refuse_titles(table[0], f"{name}, line {started}", data)
-    draft = _EdgeList(name, columns, started)
+    draft = EdgeList(name, columns, started)
     draft.read(chain(begin, numbered))
     rows = draft.rows()
     if not columns.titles and not columns.told:
@@ -136,7 +138,7 @@ def direction_of_comments(data: bytes, name: str) -> str:
     return ""
 
 
-class _EdgeList(Draft):
+class EdgeList(Draft):
     """The rows of a table, as they come."""
 
     def __init__(self, name: str, columns: Columns, started: int):
@@ -144,6 +146,7 @@ class _EdgeList(Draft):
         self.name, self.columns, self.started = name, columns, started
         self.signs, self.sign_codes = Numbers(), list[int]()
         self.beside = [(k, Column(columns.titles[k])) for k in columns.ignored]
+        self.kept: list[list[str]] | None = None  # the fields of every edge, where they are asked for
         self.extra: dict[str, int] = {}  # fields after the third of a table without header, and the line of each
 
     def read(self, rows: Iterable[tuple[int, list[str]]]) -> None:
@@ -166,6 +169,8 @@ class _EdgeList(Draft):
             second.append(target)
             codes.append(code)
             lines.append(number)
+            if self.kept is not None:
+                self.kept.append(row)
             for k, column in self.beside:
                 column.add(row[k] if k < len(row) else "")
 
@@ -218,7 +223,7 @@ def _refuse_titles(row: list[str], place: str, data: bytes) -> None:
         raise FormatError(f"{place}: the header {titles} names no source and target; {mend}")
 
 
-def _refuse_ambiguous(draft: _EdgeList, rows: Rows, data: bytes, konect: bool) -> None:
+def _refuse_ambiguous(draft: EdgeList, rows: Rows, data: bytes, konect: bool) -> None:
     """Refuse a table without header whose rows may be something else than ``source,target,weight``.
 
     ``konect``: its first line, as KONECT writes it, tells that the fourth column holds times.

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from lmi.exact.decimal_rounding import near
-from ptcc_certify.errors import GraphError
+from ptcc_certify.errors import GraphError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, Mode, read_share
 from ptcc_certify.graphs.io.files import Source, name_and_ending
@@ -92,8 +92,10 @@ def read_family(
     """
     how = Reading(orientation=orientation, undirected=undirected, **options)
     one = isinstance(paths, str | Path) or hasattr(paths, "read")
+    if not one and not isinstance(paths, Iterable):
+        raise ParameterError("paths", f"= {shorten(repr(paths))} is no file; give a path, or a list of paths")
     sources: list[Any] = [paths] if one else list(paths)  # type: ignore[arg-type]
-    share, wanted = read_share(uncertainty), [(str(s), str(t)) for s, t in optional]
+    share, wanted = read_share(uncertainty), _pairs(optional)
     named: dict[str, Family] = {}
     ways, notes = dict[str, str](), list[str]()
     missing = set(wanted)
@@ -137,6 +139,16 @@ def read_family(
         family.graph.read.update(record)
     again_given = _given_again([str(path) for path in sources], [*named])
     return replace(family, read=read, notes=(*family.notes, *again_given, *notes))
+
+
+def _pairs(optional: Any) -> list[tuple[str, str]]:
+    """Return the edges that may fail, by label, or refuse what are no pairs."""
+    pairs = [*optional] if isinstance(optional, Iterable) and not isinstance(optional, str | bytes) else [optional]
+    for pair in pairs:
+        if not isinstance(pair, tuple | list) or len(pair) != 2:
+            mend = 'give pairs of who is heard and who listens, such as [("a", "b")]'
+            raise ParameterError("optional", f"holds {shorten(repr(pair))}, which is no edge; {mend}")
+    return [(str(source), str(target)) for source, target in pairs]
 
 
 def _given_again(paths: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from ptcc_certify.graphs.io.columns_beside import directions, is_signed, notes_o
 from ptcc_certify.graphs.io.laplacian import Diagonal, diagonal_of, fits_one_node
 from ptcc_certify.graphs.io.problems import Problem, one_message
 from ptcc_certify.graphs.io.rows import DECIMALS, HEADER_MEND, Rows, Signs
-from ptcc_certify.graphs.io.signs import DIRECTIONS, NO_SIGN, sign_of_word
+from ptcc_certify.graphs.io.signs import DIRECTIONS, NO_SIGN, code_among, sign_of_word
 from ptcc_certify.graphs.rationals import MINUS, as_fraction, nearest_float, parse_exact, shorten
 from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.graphs.tables import in_all, ordered_labels
@@ -171,7 +171,7 @@ class _Draft:
             order = sorted(range(len(weights)), key=lambda code: words[code] is not None)
             by_code = {code: self.parsed(weights[code], code) for code in order}  # what is neither is told first
             values = [by_code[code] for code in range(len(weights))]
-        if (title := self.rows.beside.title) and (odd := _codes(values, title)) is not None:
+        if (title := self.rows.beside.title) and (odd := code_among(values, title)) is not None:
             what = f'column "{shorten(title)}" holds {odd}: codes of relations, not signs'
             self.refuse(int(np.argmax(self.codes == values.index(odd))), f"{what}; {self.columns_mend()}")
         return values
@@ -264,14 +264,14 @@ class _Draft:
             self.undirected = self.undirected or (f'column "{title}"' if directions[0] else "")
             return
         factors = [self.factor(text, beside == code, title) for code, text in enumerate(texts)]
-        if (odd := _codes([*map(Fraction, factors)], signs.title)) is not None:
+        if (odd := code_among([*map(Fraction, factors)], signs.title)) is not None:
             what = f'column "{title}" holds {", ".join(map(str, sorted(factors)))} and no -1'
             self.refuse(int(np.argmax(beside == factors.index(int(odd)))), f"{what}; {self.columns_mend()}")
         pairs, which = np.unique(self.codes * len(texts) + beside, return_inverse=True)
         both = [(Fraction(self.values[p // len(texts)]), factors[p % len(texts)]) for p in pairs.tolist()]
         if negative := any(weight < 0 for weight, _ in both):
             for k, (weight, factor) in enumerate(both):
-                if weight * factor < 0:
+                if weight * factor < 0 or (weight < 0 and not factor):
                     edge = int(np.argmax(which == k))
                     what = f'weight {weight} of edge {self.edge(edge)} and {factor} in column "{title}" disagree'
                     self.refuse(edge, f"{what}; {self.columns_mend()}")
@@ -391,16 +391,3 @@ class _Draft:
             if rows.size and not self.how.drop_zeros:
                 self.tell_zeros(rows, "sum 0 of the weights")
         return (f"{repeated} repeated rows were merged ({duplicates})",)
-
-
-def _codes(values: Sequence[Fraction], title: str) -> Fraction | None:
-    """Return a number that makes a column of relations one of codes; None where it holds signs, 1 and -1.
-
-    A column called sign may hold 1 alone, or any number beside a negative one.
-    """
-    numbers = set(values)
-    if title.strip().lower() == "sign":
-        return None if min(numbers, default=0) < 0 else next((v for v in values if v != 1), None)
-    if not numbers or (-1 in numbers and numbers <= {-1, 0, 1}):
-        return None
-    return next((v for v in values if v not in (-1, 1)), values[0])

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from itertools import chain
 from typing import NamedTuple
 
 from lmi.exact.decimal_rounding import counted
 from ptcc_certify.errors import FormatError, GraphError, ParameterError
-from ptcc_certify.graphs.io.columns_beside import Column, column_of, notes_on_ignored, signs_beside_intervals
-from ptcc_certify.graphs.io.edge_list import direction_of_comments, records
+from ptcc_certify.graphs.io.columns_beside import notes_on_ignored, signs_beside_intervals
+from ptcc_certify.graphs.io.edge_list import EdgeList, direction_of_comments, records
 from ptcc_certify.graphs.io.files import Source, name_and_ending
 from ptcc_certify.graphs.io.graph_files import format_of, graph_bytes, is_edge_list
-from ptcc_certify.graphs.io.intervals import Entry, Interval, interval_columns, numbers_of_words
+from ptcc_certify.graphs.io.intervals import Entry, Interval, interval_columns, told_weights
 from ptcc_certify.graphs.io.problems import Problem, one_message
-from ptcc_certify.graphs.io.signs import is_sign, weight_and_sign
-from ptcc_certify.graphs.io.table_columns import BY_HEADER, edge_columns
+from ptcc_certify.graphs.io.signs import is_sign, plain
+from ptcc_certify.graphs.io.table_columns import BY_HEADER, RATERS, Columns, edge_columns
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.graphs.tables import in_all
@@ -34,10 +36,11 @@ class _Table(NamedTuple):
 
     name: str
     data: bytes
-    header: list[str]
+    header: tuple[str, ...]
+    started: int  # the line of the header
     ends: tuple[int, int, int | None]  # columns of source, target and weight
     columns: tuple[int | None, int | None, int | None]  # of the least and the largest weight, and of what may fail
-    rows: Iterator[tuple[int, list[str]]]  # below the header
+    rows: Iterator[tuple[int, list[str]]]  # but for the header
 
 
 @dataclass
@@ -77,12 +80,20 @@ def _table(path: Source) -> _Table | None:
         path.seek(0)
     if not is_edge_list(format_of(data, ending)):
         return None
-    rows = ((number, [field.strip() for field in row]) for number, row in records(data, name))
-    header = next((row for _, row in rows if len(row) > 1), [])
+    rows, before = records(data, name), list[tuple[int, list[str]]]()
+    for number, row in rows:
+        if len(row) > 1:
+            break
+        before.append((number, row))  # declares a node
+    else:
+        return None
+    header = tuple(field.strip() for field in row)
     if (ends := edge_columns(header, name)) is None:
         return None
     columns = interval_columns(header, name)
-    return None if columns == (None, None, None) else _Table(name, data, header, ends, columns, rows)
+    if columns == (None, None, None):
+        return None
+    return _Table(name, data, header, number, ends, columns, chain(before, rows))
 
 
 def read_interval_rows(path: Source, how: Reading, share: Fraction) -> IntervalRows | None:
@@ -119,17 +130,75 @@ def read_interval_rows(path: Source, how: Reading, share: Fraction) -> IntervalR
             f"{table.name}: gives intervals itself; leave out the uncertainty, or write those of all files"
         )
     problems = _of_the_header(table, how)
-    nodes, numbered = _fields(table)
-    rows = IntervalRows(nodes, notes=(BY_HEADER,) if table.ends[0] > 0 else ())
-    entries, beside = _entries(table, numbered, how)
-    if text := signs_beside_intervals(beside, (end for _, entry in entries for end in entry[3:6] if end is not None)):
+    edges = _Edges(table)
+    edges.read(table.rows)
+    if not edges.nodes and not edges.problems:
+        raise FormatError(f"{table.name}: no edge and no node below the header; give rows")
+    rows = IntervalRows([*edges.nodes.texts], notes=(BY_HEADER,) if table.ends[0] > 0 else ())
+    rows.notes += (RATERS,) if plain(table.header[table.ends[0]]) == "rater" and how.orientation is None else ()
+    beside = [column for _, column in edges.beside]
+    try:
+        entries = edges.entries(how)
+        text = signs_beside_intervals(beside, [entry[3:6] for _, entry in entries])
+    except GraphError as error:
+        text = str(error)
+    if text:
         raise FormatError(f"{table.name}: {text}")
     rows.notes += notes_on_ignored(beside)
-    _take(rows, entries, how, share, problems)
+    _take(rows, entries, how, share, problems, edges.problems)
     if problems:
         place, message = one_message(problems, lambda *options: " ".join(options))
         raise FormatError(f"{', '.join(filter(None, (table.name, place)))}: {message}")
     return rows
+
+
+class _Edges(EdgeList):
+    """The rows of a table with intervals, with all their fields, and those that are no edges."""
+
+    def __init__(self, table: _Table):
+        first, second, weight = table.ends
+        self.columns_told = table.columns
+        low = table.columns[0]
+        assert weight is not None or low is not None
+        columns = Columns(first, second, weight if low is None else low, titles=table.header)  # type: ignore[arg-type]
+        super().__init__(table.name, columns, table.started)
+        self.weight, self.kept, self.problems = weight, [], list[Problem]()
+        self.beside = [(k, column) for k, column in self.beside if k not in (weight, *table.columns)]
+
+    def no_edge(self, number: int, row: list[str]) -> None:
+        """Declare the node of a row without an edge, or note what is wrong with the row."""
+        with self._noted(number):
+            super().no_edge(number, row)
+
+    def more_fields(self, number: int, row: list[str], width: int) -> None:
+        """Note a row with fields beyond the header."""
+        with self._noted(number):
+            super().more_fields(number, row, width)
+
+    @contextmanager
+    def _noted(self, number: int) -> Iterator[None]:
+        try:
+            yield
+        except FormatError as error:
+            text, _, mend = str(error).removeprefix(f"{self.name}, line {number}: ").partition("; ")
+            self.problems.append(Problem(f"line {number}", text, mend))
+
+    def entries(self, how: Reading) -> list[tuple[str, Entry]]:
+        """Return the edges as they are told, each with its line."""
+        kept, labels = self.kept or [], [*self.nodes.texts]
+        field = lambda row, k: row[k].strip() if k < len(row) else ""  # noqa: E731
+        column = lambda k: [None] * len(kept) if k is None else [field(row, k) for row in kept]  # noqa: E731
+        least, largest, fails = map(column, self.columns_told)
+        weights = column(self.weight)
+        if self.columns_told[0] is None and self.weight is not None:
+            weights = told_weights(weights, self.columns.titles[self.weight])
+        result = []
+        ends = (self.first, self.second) if how.orientation != "listens" else (self.second, self.first)
+        told = zip(weights, least, largest, ["" if may is None else may for may in fails], strict=True)
+        for s, t, line, values in zip(*ends, self.lines, told, strict=True):
+            source, target = labels[s], labels[t]
+            result.append((f"line {line}", Entry(f"edge {_text((source, target))}", source, target, *values)))
+        return result
 
 
 def _of_the_header(table: _Table, how: Reading) -> list[Problem]:
@@ -137,66 +206,30 @@ def _of_the_header(table: _Table, how: Reading) -> list[Problem]:
     name, header, (_, _, weight), (low, _, _) = table.name, table.header, table.ends, table.columns
     if low is None and weight is None:
         raise FormatError(f"{name}: the header names no weight; name a column weight, or weight_min and weight_max")
-    weight, sign = weight_and_sign(header, name)
-    beside = sign if sign is not None or low is None else weight
-    if beside is not None and is_sign(header[beside]):
-        mend = "write the sign into the weights or both ends of the intervals, and leave the column out"
-        raise FormatError(f'{name}: a column "{shorten(header[beside])}" beside the weights; {mend}')
+    if low is not None and weight is not None and is_sign(header[weight]):
+        mend = "write the sign into both ends of the intervals, and leave the column out"
+        raise FormatError(f'{name}: a column "{shorten(header[weight])}" beside the weights; {mend}')
     if (said := direction_of_comments(table.data, name)) and not how.undirected:
         return [Problem("", f"{said} means undirected edges", "let each go both ways with {}", "--undirected")]
     return []
 
 
-def _fields(table: _Table) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """Return the nodes, and the fields of rows with edges, by the numbers of their lines."""
-    nodes, edges = dict[str, None](), list[tuple[int, list[str]]]()
-    width = len(table.header)
-    for number, row in table.rows:
-        if any(row[width:]):
-            what = f"{len(row)} fields, and the header has {width}; quote fields with separators"
-            raise FormatError(f"{table.name}, line {number}: {what}")
-        filled = [*filter(None, row)]
-        if len(filled) > 1:
-            edges.append((number, row + [""] * (width - len(row))))
-        nodes |= dict.fromkeys([row[k] for k in table.ends[:2]] if len(filled) > 1 and len(row) > 1 else filled)
-    if not nodes:
-        raise FormatError(f"{table.name}: no edge and no node below the header; give rows")
-    return list(nodes), edges
-
-
-def _entries(
-    table: _Table, numbered: Sequence[tuple[int, list[str]]], how: Reading
-) -> tuple[list[tuple[str, Entry]], list[Column]]:
-    """Return the edges as they are told, each with its line, and the columns that are not read."""
-    first, second, weight = table.ends
-    column = lambda k: [None] * len(numbered) if k is None else [row[k] for _, row in numbered]  # noqa: E731
-    weights = column(weight)
-    if table.columns[0] is None:
-        weights = numbers_of_words(weights)
-    least, largest, fails = map(column, table.columns)
-    told = weights, least, largest, [text or "" for text in fails]
-    if how.orientation == "listens":
-        first, second = second, first
-    entries = []
-    for (number, row), values in zip(numbered, zip(*told, strict=True), strict=True):
-        place = f"line {number}"
-        entries.append((place, Entry(f"edge {_text((row[first], row[second]))}", row[first], row[second], *values)))
-    read = (*table.ends, *table.columns)
-    return entries, [column_of(table.header[k], column(k)) for k in range(len(table.header)) if k not in read]
-
-
 def _take(
-    rows: IntervalRows, entries: Sequence[tuple[str, Entry]], how: Reading, share: Fraction, problems: list[Problem]
+    rows: IntervalRows,
+    entries: Sequence[tuple[str, Entry]],
+    how: Reading,
+    share: Fraction,
+    problems: list[Problem],
+    no_edges: Sequence[Problem],
 ) -> None:
     """Take edges into ``rows``, and what is wrong into ``problems``: of each kind the first row, and how many."""
     seen: dict[tuple[str, str], str] = {}
     broken = defaultdict[str, list[Problem]](list)
+    for problem in no_edges:
+        broken[problem.mend].append(problem)
     for place, entry in entries:
         pair = entry.source, entry.target
-        if "" in pair:
-            empty = "target" if entry.source else "source"
-            broken["empty"].append(Problem(place, f"the {empty} is empty", "name a node or remove the row"))
-        elif entry.source == entry.target:
+        if entry.source == entry.target:
             rows.loops += 1
             text, mend = f"self-loop at node {shorten(entry.source)}", "remove it, or drop all with {}"
             broken["loop"].append(Problem(place, text, mend, "--drop-self-loops"))
@@ -209,7 +242,7 @@ def _take(
                 edge = entry.interval(share)
             except GraphError as error:
                 text, _, mend = str(error).partition("; ")
-                broken["weight"].append(Problem(place, text, mend.replace("{", "{{").replace("}", "}}")))
+                broken[mend].append(Problem(place, text, mend.replace("{", "{{").replace("}", "}}")))
                 continue
             again = pair if pair in seen else pair[::-1]
             if again in seen and (again == pair or how.undirected):
@@ -224,7 +257,8 @@ def _take(
     for kind, option in (("loop", how.drop_self_loops), ("zero", how.drop_zeros)):
         if option:
             broken.pop(kind, None)
-    problems += [replace(some[0], text=some[0].text + in_all(len(some))) for some in broken.values()]
+    found = [replace(some[0], text=some[0].text + in_all(len(some))) for some in broken.values()]
+    problems += sorted(found, key=lambda problem: int(problem.place.removeprefix("line ")))
 
 
 def _text(pair: Sequence[str]) -> str:

@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 
 from ptcc_certify.errors import FormatError, GraphError, NumberError, ParameterError
 from ptcc_certify.graphs.family import read_interval
-from ptcc_certify.graphs.io.signs import find, sign_of_word
+from ptcc_certify.graphs.io.signs import code_among, find, is_sign, sign_of_word
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, shorten
+from ptcc_certify.graphs.tables import refuse_unnamed
 
 _LEAST = ("weight_min", "min_weight", "w_min", "least", "min", "lower")
 _LARGEST = ("weight_max", "max_weight", "w_max", "largest", "max", "upper")
@@ -53,16 +54,16 @@ class Entry(NamedTuple):
 
     @property
     def always_zero(self) -> bool:
-        """Whether its weight, or both ends of its interval, are the number 0.
+        """Whether its weight and both ends of its interval, as far as they are told, are the number 0.
 
         Examples
         --------
         >>> Entry("row 1", "a", "b", None, "0.0", "0", None).always_zero
         True
         """
-        ends = (self.weight,) if self.least is None and self.largest is None else (self.least, self.largest)
+        told = [end for end in (self.weight, self.least, self.largest) if end is not None and str(end).strip()]
         try:
-            return not any(as_fraction(end, "weight") for end in ends)
+            return bool(told) and not any(as_fraction(end, "weight") for end in told)
         except (NumberError, TypeError):
             return False
 
@@ -79,6 +80,10 @@ class Entry(NamedTuple):
         >>> Entry("row 1", "a", "b", "-2", None, None, "yes").interval(Fraction(1, 10))
         ('a', 'b', Fraction(-11, 5), Fraction(0, 1))
         """
+        for end, node in (("source", self.source), ("target", self.target)):
+            if isinstance(node, str) and not node.strip():
+                raise GraphError(f"{self.place}: the {end} is empty; name a node or remove the row")
+            refuse_unnamed(node, self.place)
         single = self.least is None and self.largest is None
         if not single and share:
             raise ParameterError(TWICE)
@@ -107,17 +112,31 @@ def may_fail(least: Fraction, largest: Fraction) -> tuple[Fraction, Fraction]:
     return min(least, Fraction(0)), max(largest, Fraction(0))
 
 
-def numbers_of_words(weights: Iterable[Any]) -> list[Any]:
-    """Return 1 and -1 in the place of words for signs, where weights are nothing else.
+def told_weights(weights: Iterable[Any], title: str) -> list[Any]:
+    """Return weights, with 1 and -1 in the place of words for signs where they are nothing else.
+
+    Raises
+    ------
+    GraphError
+        The title is one of signs, and the numbers are codes of relations.
 
     Examples
     --------
-    >>> numbers_of_words(["activates", "-"]), numbers_of_words(["-", "2"])
+    >>> told_weights(["activates", "-"], "type"), told_weights(["-", "2"], "weight")
     ([1, -1], ['-', '2'])
     """
     weights = list(weights)
     words = [sign_of_word(weight) if isinstance(weight, str) else None for weight in weights]
-    return weights if None in words else words
+    if None not in words:
+        return words
+    try:
+        numbers = [as_fraction(weight, "weight") for weight in weights]
+    except (NumberError, TypeError):
+        return weights  # which is told of the edge
+    if is_sign(title) and (code := code_among(numbers, title)) is not None:
+        what = f'column "{shorten(title)}" holds {code}: codes of relations, not signs'
+        raise GraphError(f"{what}; write 1 and -1, or call the column weight if it holds weights")
+    return weights
 
 
 def _refuse_outside(weight: object, least: Fraction, largest: Fraction, place: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from fractions import Fraction
 
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.rationals import MINUS, shorten
@@ -96,3 +97,21 @@ def weight_and_sign(titles: Sequence[str], place: str) -> tuple[int | None, int 
     """
     weight, sign = find(titles, WEIGHT, place), find(titles, SIGN, place)
     return (sign, None) if weight is None else (weight, sign)
+
+
+def code_among(values: Sequence[Fraction], title: str) -> Fraction | None:
+    """Return a number that makes a column of relations one of codes; None where it holds signs, 1 and -1.
+
+    A column called sign may hold 1 alone, or any number beside a negative one.
+
+    Examples
+    --------
+    >>> code_among([Fraction(1), Fraction(2)], "type"), code_among([Fraction(1), Fraction(-1)], "type")
+    (Fraction(1, 1), None)
+    """
+    numbers = set(values)
+    if title.strip().lower() == "sign":
+        return None if min(numbers, default=0) < 0 else next((v for v in values if v != 1), None)
+    if not numbers or (-1 in numbers and numbers <= {-1, 0, 1}):
+        return None
+    return next((v for v in values if v not in (-1, 1)), values[0])
