@@ -191,8 +191,8 @@ def _refuse_unproved(options: Options, certified: bool) -> None:
     """Refuse what is asked of single integrators alone, by the names of the options: those with one mend at once."""
     if exchanges_virtual(options):
         raise ParameterError(
-            "--exchange: of vehicles that exchange virtual positions this is not built yet; certify them with "
-            "ptcc certify, one coordinate at a time, or leave it out"
+            "--exchange: of vehicles that exchange virtual positions this is not built yet; "
+            "ptcc certify takes one coordinate at a time; or leave it out"
         )
     given = [name for name in _OF_SINGLE_INTEGRATORS if options.get(name) is not None]
     if given:

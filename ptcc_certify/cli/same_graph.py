@@ -130,13 +130,18 @@ class _Pair:
         """Return how the certificate says that its graph was read, as options; nothing where it tells anything else."""
         from ptcc_certify.graphs.io.family_files import keywords_of
         from ptcc_certify.graphs.io.graph_files import keywords_as
+        from ptcc_certify.graphs.io.interval_rows import is_family_file
+        from ptcc_certify.graphs.reading import options_of_record
 
         if self.kind == "family":
             keywords = keywords_of(self.document["unverified"].get("read"))
         else:
-            file = self.files[0]
+            file, read = self.files[0], self.document["graph"]["read"]
             try:
-                keywords = keywords_as(file, self.document["graph"]["read"])
+                if is_family_file(file):  # in which all weights are known
+                    keywords = {"orientation": read["orientation"], **options_of_record(read)}
+                else:
+                    keywords = keywords_as(file, read)
             except PTCCError:  # a file of another kind than the sender's
                 return {}
         named = {"edges" if name == "orientation" else name: value for name, value in keywords.items()}

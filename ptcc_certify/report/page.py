@@ -254,8 +254,13 @@ def _title(saved: Certificate) -> Markup:
         text = Markup("every agent keeps {}").format("its state" if saved.direct else "x \u2212 \u03c3")
     if saved.proof.agents is None:
         text += "" if saved.proof.offsets is None else " of x \N{MINUS SIGN} offsets"
-        text += "".join(f", {assumption}" for assumption in assumptions(saved) if assumption != "without limits")
+        text += _without(saved)
     return text[:1].upper() + text[1:] if saved.verdict == "certified" else "Undecided: " + text
+
+
+def _without(saved: Certificate) -> str:
+    """Say what a claim is without, where more was asked."""
+    return "".join(f", {assumption}" for assumption in assumptions(saved) if assumption != "without limits")
 
 
 def _of_family(saved: Certificate, why: Counterexamples) -> dict[str, Any]:
@@ -270,6 +275,7 @@ def _of_family(saved: Certificate, why: Counterexamples) -> dict[str, Any]:
         title = Markup("where agents end depends on the signal")
     elif saved.verdict != "certified":
         title = Markup("what the agents do at T = {}").format(T)
+    title += _without(saved)
     title = title.replace("= \u2248", "\u2248")
     title = title[:1].upper() + title[1:] if saved.verdict == "certified" else "Undecided: " + title
     bound = min((p.upper_bound for p in proof.parts if p.upper_bound), key=lambda b: b.value, default=None)
@@ -327,7 +333,9 @@ def _runs(saved: Certificate, runs: Sequence[Trajectory], run: AgentsTrajectory 
     text = "The run was repeated for this page with CVODES, from the initial state of the certificate"
     if asked is not None:
         limits = limits_text(asked, saved).replace("$T$", "T")
-        text += f"; states and input are those of a run with what was asked: {limits}"
+        stepped = asked.conditions.messages is not None or asked.conditions.leaders is not None
+        how = "a run in steps of closed form" if stepped else "a run"
+        text += f"; states and input are those of {how} with what was asked: {limits}"
     elif ideal:
         text += f", with {ideal}"
     return view | {"run_text": f"{text}.", "asked_run": asked is not None}

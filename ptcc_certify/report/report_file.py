@@ -143,7 +143,10 @@ def _with_runs(saved: Certificate, simulation: bool | None) -> tuple[Certificate
     if saved.initial_state is None:
         return saved, [], "the certificate names no initial state"
     if of_family and (saved.proof.late is not None or saved.proof.leaders_move):
-        return saved, [], "with late messages or leaders that move none is made of a family"
+        late = saved.proof.late
+        exact = late is not None and late.messages.exact and not saved.proof.leaders_move
+        asked = "vehicles that exchange virtual positions" if exact else "late messages or leaders that move"
+        return saved, [], f"with {asked} none is made of a family"
     if simulation is None and n > most:
         return saved, [], f"above {most} agents it is {made} only where that is asked for"
     try:

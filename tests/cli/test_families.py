@@ -358,6 +358,15 @@ def test_rows_with_intervals_that_are_always_zero_and_self_loops_are_dropped_whe
     assert ptcc("check", "i.json", "same.csv").code == 0
 
 
+def test_a_file_of_intervals_in_which_all_weights_are_known_is_compared_as_its_sender_read_it(folder):
+    Path("k.csv").write_text(_rows("lead,a,1,1", "a,b,2,2", "b,a,0,0", "b,b,1,2"))
+    dropped = ("--drop-zeros", "--drop-self-loops")
+    assert ptcc("certify", "k.csv", *dropped, "-o", "k.json").code == 0
+    run = ptcc("check", "k.json", "k.csv")
+    assert run.code == 1 and "accepted if --drop-self-loops --drop-zeros is what you mean" in " ".join(run.out.split())
+    assert ptcc("check", "k.json", "k.csv", *dropped).code == 0
+
+
 def test_a_header_of_intervals_in_another_order_is_said_to_be_read(folder):
     for weights, said in (("1,2", "columns by header"), ("2,2", "columns by header: information flows")):
         Path("i.csv").write_text(f"target,source,min,max\na,b,{weights}\nb,a,{weights}\n")

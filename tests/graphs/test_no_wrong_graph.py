@@ -651,7 +651,7 @@ def test_signs_of_any_title_in_memory_are_factors_or_refused_and_what_is_not_rea
 @pytest.mark.parametrize(
     ("content", "says"),
     [
-        ("source,target,weight_min,weight_max,sign\na,b,1,2,-1\n", 'a column "sign" beside the weights'),
+        ("source,target,weight_min,weight_max,sign\na,b,1,2,-1\n", 'column "sign" holds -1 beside the weights'),
         ("source,target,weight,sign,optional\na,b,1,-1,yes\n", 'column "sign" holds -1 beside the weights'),
         ("source,target,type,optional\na,b,1,yes\nb,a,2,no\n", 'column "type" holds 2: codes of relations'),
         ("source,target,min,max,mode\na,b,1,2,inhibits\nb,a,-2,-1,inhibits\n", 'column "mode" holds inhibits'),

@@ -19,7 +19,7 @@ from ptcc_certify.graphs.io.interval_rows import is_family_file
 from ptcc_certify.graphs.io.intervals import TWICE, Entry, interval_columns, told_weights
 from ptcc_certify.graphs.io.packaged import GRAPHS, file_or_packaged
 from ptcc_certify.graphs.io.rows import Beside, Nodes, Rows, Signs, distinct, rows_of
-from ptcc_certify.graphs.io.signs import OF_EDGES
+from ptcc_certify.graphs.io.signs import OF_EDGES, is_sign
 from ptcc_certify.graphs.io.table_columns import BY_HEADER, RATERS, columns_of, edge_columns
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
@@ -314,6 +314,8 @@ def _entries_of_table(table: Any) -> list[Entry] | None:
         return None
     if low is None and ends[2] is None:
         raise GraphError("the DataFrame names no weight; name a column weight, or weight_min and weight_max")
+    if low is not None and ends[2] is not None and is_sign(names[ends[2]]):
+        ends = (*ends[:2], None)  # a column of signs, or of directions
     m = len(table)
     rest = [
         [absent] * m if k is None else list(table[table.columns[k]])

@@ -93,6 +93,8 @@ def _table(path: Source) -> _Table | None:
     columns = interval_columns(header, name)
     if columns == (None, None, None):
         return None
+    if columns[0] is not None and ends[2] is not None and is_sign(header[ends[2]]):
+        ends = (*ends[:2], None)  # a column of signs, or of directions
     return _Table(name, data, header, number, ends, columns, chain(before, rows))
 
 
@@ -202,13 +204,10 @@ class _Edges(EdgeList):
 
 
 def _of_the_header(table: _Table, how: Reading) -> list[Problem]:
-    """Refuse headers that tell no weight, or signs beside weights; return what comments say of undirected edges."""
-    name, header, (_, _, weight), (low, _, _) = table.name, table.header, table.ends, table.columns
+    """Refuse headers that tell no weight; return what comments say of undirected edges."""
+    name, (_, _, weight), (low, _, _) = table.name, table.ends, table.columns
     if low is None and weight is None:
         raise FormatError(f"{name}: the header names no weight; name a column weight, or weight_min and weight_max")
-    if low is not None and weight is not None and is_sign(header[weight]):
-        mend = "write the sign into both ends of the intervals, and leave the column out"
-        raise FormatError(f'{name}: a column "{shorten(header[weight])}" beside the weights; {mend}')
     if (said := direction_of_comments(table.data, name)) and not how.undirected:
         return [Problem("", f"{said} means undirected edges", "let each go both ways with {}", "--undirected")]
     return []

@@ -11,7 +11,7 @@ from ptcc_certify.bounds.final_state.of_graph import extremes
 from ptcc_certify.certificate.constrained_switching.states import constant_states, last_states, states_of_signal
 from ptcc_certify.certificate.facts import Fact, Facts
 from ptcc_certify.errors import labelled
-from ptcc_certify.report.facts.claim import range_text, told_ranges
+from ptcc_certify.report.facts.claim import assumptions, range_text, told_ranges
 from ptcc_certify.report.facts.intervals import interval_text, intervals_text
 from ptcc_certify.report.facts.signals import agreement_text, every_text, rests
 from ptcc_certify.report.text_layout import (
@@ -49,7 +49,7 @@ def final_facts(certificate: Certificate) -> Facts:
         return
     remarks = {
         "balanced leaders happen to meet at 0": bool(result.degenerate),
-        "without limits": bool(certificate.limits),
+        **dict.fromkeys(assumptions(certificate), True),
         "not certified that they get there": certificate.verdict == "undecided",
     }
     more = "".join(f"; {remark}" for remark, holds in remarks.items() if holds) + ")"
@@ -107,7 +107,8 @@ def family_final_facts(certificate: Certificate) -> Facts:
         ends, more = states_of_signal(certificate.family_proof), f"{agreement_text(certificate)} (these signals)"
         head = "x(T)" if rests(certificate) else "x(t)"
     if ends is not None:
-        note, brief = (f"{intervals_text(labels, ends, width)}{more}" for width in (_LONG, _SHORT))
+        assumed = f" ({', '.join(without)})" if (without := assumptions(certificate)) else ""
+        note, brief = (f"{intervals_text(labels, ends, width)}{more}{assumed}" for width in (_LONG, _SHORT))
         yield Fact(head=head, value=dict(zip(labels, ends, strict=True)), note=note, brief=(brief,))
     if text := constant_text(certificate):
         brief = f"{constant_text(certificate, _SHORT)} (constant weights)"

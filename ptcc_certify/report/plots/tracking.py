@@ -23,7 +23,7 @@ _RUNS: dict[str, dict[str, Any]] = {
     "square": {"color": BEHIND, "linewidth": 0.8, "linestyle": "--", "label": "now late, now not"},
 }
 #: What is proved at ``T`` alone is drawn below this share of what is proved over time.
-_NEARER = 0.9
+_NEARER = 0.5
 #: A lower bound at ``T`` is drawn from this share of the upper one on.
 _SEEN = 1e-3
 
