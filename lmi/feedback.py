@@ -8,7 +8,7 @@ What is found is proved elsewhere.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.linalg import solve_continuous_lyapunov
@@ -76,10 +76,10 @@ def feedback_matrix(systems: Sequence[np.ndarray], rate: float) -> np.ndarray:
     raise NoCertificate(f"no feedback of rate {rate:.6g} was found")
 
 
-def later_matrix(
-    systems: Sequence[np.ndarray], gains: np.ndarray, former: np.ndarray, strength: float, rate: float
-) -> np.ndarray | None:
-    """Find a matrix not below a former one by which a given feedback decays at another rate; None if none is found.
+def later_matrices(
+    systems: Sequence[np.ndarray], gains: np.ndarray, former: np.ndarray, strength: float
+) -> Callable[[float], np.ndarray | None]:
+    """Return the search of matrices not below a former one by which a given feedback decays at other rates.
 
         minimise sum W_ii/former_ii   subject to   W >= former,   W gains = d b,
         A_i W + W A_i' - strength d b b' + rate W <= -slack rate W
@@ -91,13 +91,18 @@ def later_matrix(
     gains : (n,) array
     former : (n, n) array
         Symmetric positive definite.
-    strength, rate : float
+    strength : float
         Positive.
+
+    Returns
+    -------
+    callable
+        Of a positive rate; it returns ``W``, or None if none is found. The program is built once for all rates.
 
     Examples
     --------
     >>> one = np.ones((1, 1))
-    >>> later_matrix([0 * one], np.ones(1), one, 1.0, 0.5).round(3)  # 0.5 W <= d, W = d
+    >>> later_matrices([0 * one], np.ones(1), one, 1.0)(0.5).round(3)  # 0.5 W <= d, W = d
     array([[1.]])
     """
     import cvxpy as cp
@@ -105,20 +110,25 @@ def later_matrix(
     C = np.linalg.cholesky(former)
     back, n = np.linalg.inv(C), len(former)
     turned, last = [back @ A @ C for A in systems], back[:, -1]
-    W, d = cp.Variable((n, n), symmetric=True), cp.Variable()
+    W, d, rate = cp.Variable((n, n), symmetric=True), cp.Variable(), cp.Parameter(pos=True)
     gap = [strength * d * np.outer(last, last) - (1 + SLACKS[1]) * rate * W - A @ W - W @ A.T for A in turned]
     limits = [(F + F.T) / 2 >> 0 for F in gap] + [W - (1 + SLACKS[1]) * np.eye(n) >> 0, W @ (C.T @ gains) == d * last]
     weight = C.T @ np.diag(1 / former.diagonal()) @ C
     problem = cp.Problem(cp.Minimize(cp.trace(weight @ W)), [*limits, LARGEST * np.eye(n) - W >> 0])
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # as above
-            run_solver(problem, "clarabel", {})
-    except NoCertificate:
-        return None
-    if problem.status != "optimal" or W.value is None:
-        return None
-    return np.asarray(C @ (W.value + W.value.T) @ C.T / 2)
+
+    def matrix_at(value: float) -> np.ndarray | None:
+        rate.value = value
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # as above
+                run_solver(problem, "clarabel", {"warm_start": False})
+        except NoCertificate:
+            return None
+        if problem.status != "optimal" or W.value is None:
+            return None
+        return np.asarray(C @ (W.value + W.value.T) @ C.T / 2)
+
+    return matrix_at
 
 
 def _frame(systems: Sequence[np.ndarray]) -> np.ndarray:

@@ -63,8 +63,9 @@ class SparseHMatrix:
             No positive bound was found.
         """
         y, low = np.ones(self.M.shape[0]), 0.0
+        factor = Factor(self.M) if y.size <= DIRECT_ROWS else None
         for _ in range(_ROUNDS):
-            y = np.abs(solve(self.M, y, self.diagonal))
+            y = np.abs(solve(self.M, y, self.diagonal) if factor is None else factor.solve(y))
             y /= y.max()
             if not (y > 0).all():
                 break

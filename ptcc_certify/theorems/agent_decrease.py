@@ -30,7 +30,7 @@ from lmi.exact import arithmetic
 from lmi.exact.decimal_rounding import down
 from lmi.exact.matrix_polynomials import nonnegative_between, semidefinite
 from lmi.exact.numbers import integers
-from lmi.feedback import feedback_matrix, later_matrix
+from lmi.feedback import feedback_matrix, later_matrices
 
 Matrix = tuple[tuple[Fraction, ...], ...]
 #: Significant bits of the entries of ``W``, and digits of the gains: the first that prove.
@@ -357,10 +357,10 @@ def _later_phase(
     """Return the fastest phase that is found, if it is faster than the former by :data:`FASTER`."""
     systems, W = agent.vertices(agent.span or ()), _floats(former)
     low, high = float(rate), 2 * float(rate)
-    best = None
+    best, matrix_at = None, later_matrices(systems, floats, W, float(beta))
     for _ in range(BISECTIONS):
         middle = (low + high) / 2
-        solution = later_matrix(systems, floats, W, float(beta), middle)
+        solution = matrix_at(middle)
         low, high = (low, middle) if solution is None else (middle, high)
         best = best if solution is None else (solution, middle)
     if best is None or best[1] < FASTER * float(rate):

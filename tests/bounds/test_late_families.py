@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from fractions import Fraction
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -185,6 +186,7 @@ def random_case(seed: int, by_edge: bool = False) -> Certificate:
     return certify(family, PROTOCOL, x0, **asked)  # type: ignore[no-any-return]
 
 
+@pytest.mark.few(7)
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("by_edge", [False, True], ids=["one delay", "edge by edge"])
 def test_no_adversary_leaves_more_than_is_certified(by_edge: bool, seed: int):
@@ -232,10 +234,15 @@ BESIDE: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("x0", [[1, 2, -3], None], ids=["state", "every state"])
+@cache
+def certified(name: str, x0: tuple[int, ...] | None = (1, 2, -3)) -> Certificate:
+    return certify(UNSURE, PROTOCOL, x0, **BESIDE[name])  # type: ignore[no-any-return]
+
+
+@pytest.mark.parametrize("x0", [(1, 2, -3), None], ids=["state", "every state"])
 @pytest.mark.parametrize("name", BESIDE)
-def test_what_is_certified_is_read_back(name: str, x0: list[int] | None, tmp_path: Path):
-    made = certify(UNSURE, PROTOCOL, x0, **BESIDE[name])
+def test_what_is_certified_is_read_back(name: str, x0: tuple[int, ...] | None, tmp_path: Path):
+    made = certified(name, x0)
     made.save(tmp_path / "c.json")
     found = ptcc.read_certificate(tmp_path / "c.json")
     assert found == made and found.leaders_move == made.leaders_move == ("leaders" in BESIDE[name])
@@ -305,7 +312,7 @@ def test_under_the_sliding_mode_protocol_variables_begin_at_0():
 
 def forged(name: str, path: str, value: Any) -> str | None:
     """Return what the check says of a certificate with another number; None if it accepts that."""
-    data = certify(UNSURE, PROTOCOL, [1, 2, -3], **BESIDE[name]).to_dict()
+    data = certified(name).to_dict()
     *way, last = path.split(".")
     at: Any = data
     for key in way:
@@ -357,8 +364,7 @@ def test_rows_hold_at_the_worst_weights_of_every_mode_alone():
 
 def test_figures_are_of_what_is_asked(tmp_path: Path):
     """The bound is drawn, and no run in which nothing is late and leaders rest."""
-    late = certify(UNSURE, PROTOCOL, [1, 2, -3], **BESIDE["late"])
-    moving = certify(UNSURE, PROTOCOL, [1, 2, -3], **BESIDE["leaders that move"])
+    late, moving = certified("late"), certified("leaders that move")
     assert [late.main_figure, moving.main_figure] == ["late", "tracking"]
     assert [line.get_label() for line in late.plot().lines] == ["proved bound"]
     assert [line.get_label() for line in moving.plot().lines] == ["proved bound", "$T$"]
@@ -373,7 +379,7 @@ def test_figures_are_of_what_is_asked(tmp_path: Path):
 @pytest.mark.parametrize("name", ["late", "late behind leaders that move", "leaders that move"])
 def test_page_and_latex_tell_no_end_of_another_problem(name: str, tmp_path: Path):
     """Where agents end is told with what it leaves out, and a bound without a run is not called a run."""
-    made = certify(UNSURE, PROTOCOL, [1, 2, -3], **BESIDE[name])
+    made = certified(name)
     made.save(tmp_path / "c.json")
     saved = ptcc.read_certificate(tmp_path / "c.json")
     without = ", ".join(["nothing late"] * (made.late is not None) + ["leaders at rest"] * made.leaders_move)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import cache
 from math import comb
 from pathlib import Path
 from typing import Any
@@ -162,7 +163,7 @@ def test_one_integrator_under_a_gain_cap_and_disturbances_is_still_one_of_order_
 BESIDE: dict[str, tuple[Any, dict[str, Any]]] = {
     "nothing": (NOMINAL, {}),
     "a cap": (NOMINAL, {"limits": GainLimits(gain_cap="0.5")}),
-    "a stop and a period": (NOMINAL, {"limits": [GainLimits(stop_before="0.1"), GainLimits(sample_period="0.001")]}),
+    "a stop and a period": (NOMINAL, {"limits": [GainLimits(stop_before="0.1"), GainLimits(sample_period="0.004")]}),
     "noise and disturbances": (NOMINAL, {"limits": GainLimits(gain_cap=9), "noise": "0.1", "delta": "0.5"}),
     "late messages": (NOMINAL, {"messages": LateMessages(delay="0.001", gain_cap=5)}),
     "moving leaders": (NOMINAL, {"leaders": MovingLeaders(speed=1)}),
@@ -170,6 +171,7 @@ BESIDE: dict[str, tuple[Any, dict[str, Any]]] = {
 }
 
 
+@pytest.mark.few(7)  # each once
 @pytest.mark.parametrize("name", BESIDE)
 @pytest.mark.parametrize("graph", [TEAM, CAMPS], ids=["team", "camps"])
 def test_single_integrators_in_a_formation_have_the_plain_certificate_of_their_places(
@@ -205,8 +207,7 @@ def test_single_integrators_in_a_formation_have_the_plain_certificate_of_their_p
 
 def test_bounds_of_a_formation_under_a_cap_hold_on_the_motion_that_agents_of_order_1_make():
     """The motion, in the plane, is that of agents in their places; the bound of the input is no weaker than theirs."""
-    agents = Agents(order=1, offsets=[1, -3, 2, 2], gain_cap=4)
-    ours = certify(TEAM, NOMINAL, [5, 2, 4, -1], agents=agents, asks=Asks(simulation=False))
+    ours = in_places()
     in_plane = Agents(order=1, offsets=[[1, 0], [-3, 0], [2, 0], [2, 0]], gain_cap=4)
     part = certify(TEAM, NOMINAL, [[x, 0] for x in (5, 2, 4, -1)], agents=in_plane, asks=Asks(simulation=False)).agents
     assert part is not None and part.input is not None and ours.effort is not None
@@ -276,6 +277,13 @@ def test_the_initial_set_of_a_formation_is_that_of_positions():
     assert ours.verdict == "certified" and ours.to_dict()["input"] == plain.to_dict()["input"]
 
 
+@cache
+def in_places() -> Certificate:
+    """Of single integrators in a formation under a cap."""
+    agents = Agents(order=1, offsets=[1, -3, 2, 2], gain_cap=4)
+    return certify(TEAM, NOMINAL, [5, 2, 4, -1], agents=agents, asks=Asks(simulation=False))
+
+
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
@@ -293,8 +301,7 @@ def test_the_initial_set_of_a_formation_is_that_of_positions():
     ],
 )
 def test_places_and_positions_that_do_not_follow_are_rejected(change: Any, reason: str):
-    agents = Agents(order=1, offsets=[1, -3, 2, 2], gain_cap=4)
-    data = certify(TEAM, NOMINAL, [5, 2, 4, -1], agents=agents, asks=Asks(simulation=False)).to_dict()
+    data = in_places().to_dict()
     assert check(data).accepted
     report = check({**data, "formation": change and {**data["formation"], **change}})
     assert not report.accepted and reason in (report.reason or "")

@@ -97,7 +97,7 @@ def attacked(judge: Callable[[str, Path], Json], folder: Path, most: int) -> dic
 
 
 def test_hostile_files_stay_within_a_gigabyte_and_ten_seconds(worker: Callable[[str, Path], Json], tmp_path: Path):
-    attacked(worker, tmp_path, 2 * len(HOSTILE))
+    attacked(worker, tmp_path, len(HOSTILE))
 
 
 @pytest.mark.campaign
@@ -121,8 +121,9 @@ def test_colliding_keys_and_a_matrix_of_many_nodes_cost_the_verified_checker_lit
     _, data, _ = cases()[0]
     keys = [one + other for one in colliding() for other in colliding()][:60_000]
     (tmp_path / "keys.json").write_text(json.dumps({**data, "unverified": dict.fromkeys(keys, 0)}))
-    many = (sparse(np.random.default_rng(seed), data, {})[0] for seed in range(1000))
-    (tmp_path / "nodes.json").write_bytes(next(text for text in many if b'"15000"' in text))
+    (many,) = sparse(np.random.default_rng(8), data, {})
+    assert b'"15000"' in many
+    (tmp_path / "nodes.json").write_bytes(many)
     for name, code in (("keys.json", 0), ("nodes.json", 1)):
         answer = worker(program, tmp_path / name)
         assert answer["code"] == code and answer["memory"] < 2 * 10**8 and answer["seconds"] < 3, answer

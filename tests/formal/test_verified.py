@@ -183,7 +183,7 @@ def test_claim_final_state_and_error_bound_are_printed_as_by_the_other_check(tmp
 def test_what_is_said_of_an_obligation_is_what_the_theorem_says(tmp_path: Path) -> None:
     """The fixed texts of three kinds say more: strict ends, an equality, the rate of every mode."""
     program()
-    texts = [said(json.loads(text), tmp_path).text for text in paper_examples()]
+    texts = (said(json.loads(text), tmp_path).text for text in paper_examples())
     assert any("verified    rate-mean of rates: upper_bound >= 2 trace(A)/r" in text for text in texts)
     edges = [("a", "b", 1), ("b", "a", -1), ("b", "c", -2), ("c", "d", 1)]
     cert = certify(edges, NominalProtocol(2, 3, 1, 2), [1, 2, 3, -4], asks=Asks(simulation=False, method="full"))
