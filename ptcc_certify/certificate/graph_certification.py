@@ -35,7 +35,6 @@ from ptcc_certify.certificate.agents_part import AgentsPart, prove_agents, with_
 from ptcc_certify.certificate.agents_request import (
     Chains,
 )
-from ptcc_certify.certificate.cascade_part import prove_cascade
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.evidence import Observations
 from ptcc_certify.certificate.exit_code import rejects
@@ -95,8 +94,7 @@ def with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: b
     """Return the certificate of a graph as one of agents of order n on it."""
     functions = certificate.graph_proof.functions
     try:
-        prove = prove_agents if agents.cascade is None else prove_cascade
-        proof = prove(
+        proof = prove_agents(
             certificate.graph_proof.structure,
             certificate.protocol,
             agents,

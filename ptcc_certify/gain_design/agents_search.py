@@ -194,8 +194,7 @@ def _unusable(base: Certificate, part: AgentsAnswer, request: Request) -> str | 
         return "no input of single agents is proved for a graph of this size"
     if part.protocol.gain_cap is not None and part.residual is None and not part.alone:
         return "no deviation of single agents is proved for a graph of this size"
-    reaching, forces = part.protocol.base.reaching, abs(part.protocol.plant[0])
-    terms = Fraction(0) if reaching is None else reaching.mu1 * part.dimension
+    terms, forces = part.sliding_terms, abs(part.protocol.plant[0])
     places = forces * max(sum(map(abs, h), Fraction(0)) for h in part.protocol.offsets)
     if terms + places < request.max_input:
         return None
