@@ -9,15 +9,7 @@ from fractions import Fraction
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, float_down, float_up, near, up
-from ptcc_certify.bounds.agents.cascade import (
-    Roots,
-    course,
-    drive_integral,
-    initial_rows,
-    input_from,
-    input_is_bounded,
-    root_of,
-)
+from ptcc_certify.bounds.agents.cascade import Roots, course, drive_integral, input_from, roots_of
 from ptcc_certify.bounds.agents.comparison import AgentsComparison, compare_with_bounds
 from ptcc_certify.bounds.agents.each_agent import States, root_product
 from ptcc_certify.bounds.agents.instants import instant_roots
@@ -25,7 +17,7 @@ from ptcc_certify.bounds.agents.motion import LARGEST_DECAY, common_motion
 from ptcc_certify.bounds.final_state.of_graph import Influence
 from ptcc_certify.bounds.float_conversion import numbers
 from ptcc_certify.certificate.agents_answer import AgentsAnswer, final_states, read, rows_of, use, written
-from ptcc_certify.checker.agent_cascade import CascadeSection, TrackedSection
+from ptcc_certify.checker.agent_cascade import CascadeSection, TrackedSection, input_is_bounded
 from ptcc_certify.errors import Change, ParameterError, Sentence
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
@@ -289,8 +281,7 @@ def prove_cascade(
     protocol = CascadeProtocol.of(base, agents.alpha, offsets)
     roots: tuple[Roots, ...] = ()
     if initial_state is not None:
-        rows = initial_rows(structure, initial_state, offsets, base.gain, agents.alpha)
-        roots = tuple(Roots(*(root_of(structure, V, each) for each in rows)) for V in fields["functions"])
+        roots = roots_of(structure, protocol, fields["functions"], initial_state)
     motion = common_motion(agents.coefficients, agents.own, base.gain)
     part = CascadePart(protocol=protocol, roots=roots, initial_state=initial_state, motion=motion, **fields)
     final = None
@@ -323,11 +314,9 @@ def read_cascade(
     section: CascadeSection, structure: Structure, base: Protocol, functions: Sequence[LyapunovFunction]
 ) -> CascadePart:
     """Return what an accepted certificate says of the cascade."""
-    fields, roots = read(section, structure, functions), list[Roots]()
+    fields, roots = read(section, structure, functions), tuple[Roots, ...]()
     protocol = CascadeProtocol.of(base, section.cascade, rows_of(section.offsets))
     if (begin := fields["initial_state"]) is not None:
-        rows = initial_rows(structure, begin, protocol.offsets, base.gain, section.cascade)[2:]
-        for one, V in zip(section.functions, fields["functions"], strict=True):
-            constants = one.initial or Fraction(0), one.drive or Fraction(0)
-            roots.append(Roots(*constants, *(root_of(structure, V, x) for x in rows)))
-    return CascadePart(protocol=protocol, roots=tuple(roots), **fields)
+        pairs = zip(section.functions, roots_of(structure, protocol, fields["functions"], begin), strict=True)
+        roots = tuple(Roots(one.initial or Fraction(0), one.drive or Fraction(0), *root[2:]) for one, root in pairs)
+    return CascadePart(protocol=protocol, roots=roots, **fields)

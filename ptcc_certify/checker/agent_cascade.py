@@ -73,9 +73,9 @@ class Drive(NamedTuple):
     error: Vectors
     velocities: Vectors
 
-    def combined(self, agents: Cascade, theta: Fraction) -> Vectors:
+    def combined(self, agents: Cascade) -> Vectors:
         """Return ``r(0) = v(0)/eta(0) + (alpha + theta) x(0)``."""
-        (p, q), (a, c) = agents.eta_0.as_integer_ratio(), (agents.own[1] + theta).as_integer_ratio()
+        (p, q), (a, c) = agents.eta_0.as_integer_ratio(), agents.pull(Fraction(1)).as_integer_ratio()
         X, V = self.positions, self.velocities
         numbers = list(chain.from_iterable(chain(X.columns, V.columns)))
         sized(len(numbers), longest(numbers) + longest((p, q)) + longest((a, c)), "the input")
@@ -103,7 +103,7 @@ def check_cascade(doc: Document, verified: Verified) -> bool:
     agents = Cascade(2, d, (Fraction(0),) * 2, (Fraction(0), alpha), None, gain)
     offsets, states = sized_offsets(section.offsets, agents), section.initial_state
     need_shape(states, "initial_state", agents)
-    drive = None if states is None else _drive(graph, agents, states, offsets)
+    drive = None if states is None else drive_of(graph, agents, states, offsets)
     used = _functions(doc, verified, section, drive)
     doc.at = "agents.motion"
     M = check_motion(doc, agents, section.motion)
@@ -125,7 +125,7 @@ def check_cascade(doc: Document, verified: Verified) -> bool:
     return proved
 
 
-def _drive(graph: Digraph, agents: Cascade, states: States, offsets: Sequence[Sequence[Fraction]]) -> Drive:
+def drive_of(graph: Digraph, agents: Cascade, states: States, offsets: Sequence[Sequence[Fraction]]) -> Drive:
     """Return what the motion begins with, in integers."""
     longest_state = length(x for part in (*states, offsets) for row in part for x in row)
     spend(40 * agents.d * graph.n, longest_state, longest_state, "the initial states")
@@ -164,20 +164,41 @@ def _functions(doc: Document, verified: Verified, section: CascadeSection, drive
     return used
 
 
+def input_is_bounded(k: Fraction, rate: Fraction, alpha: Fraction) -> bool:
+    """Tell whether the input is proved not to grow without limit: ``b k >= 2``, ``alpha k >= 1``.
+
+    Not with both as equations: then its bound grows like ``s``.
+
+    Examples
+    --------
+    >>> [input_is_bounded(Fraction(1), Fraction(r), Fraction(a)) for r, a in ((4, 1), (5, 1), (4, 2), (3, 9))]
+    [False, True, True, False]
+    """
+    return rate * k >= 4 and alpha * k >= 1 and rate * k + alpha * k > 5
+
+
+def input_size(agents: Cascade, rate: Fraction, state: Fraction, combined: Fraction) -> Fraction:
+    """Return what, times ``sqrt(c_k)``, bounds an input but for ``alpha eta(0) |v_k|``, to many bits from above.
+
+    From ``sqrt(V)`` of the initial positions and of ``r(0)``, of a function by which the input is bounded.
+    """
+    k, alpha, eta = agents.gain.k, agents.own[1], agents.eta_0
+    a, b, theta = alpha - 1 / k, rate / 2 - 2 / k, agents.pull(Fraction(1)) - alpha
+    most = max(Fraction(1), (a + alpha) / (a + b))
+    return rounded(eta**2 * (combined + (1 / k - theta) * state) * most, BITS, up=True)
+
+
 def _check_input(
     doc: Document, verified: Verified, agents: Cascade, used: Sequence[Tracked], drive: Drive, section: AgentsInput
 ) -> None:
     """Verify the bound of every agent's input, in Euclidean norm over space."""
-    graph, k, alpha, eta = verified.structure.graph, agents.gain.k, agents.own[1], agents.eta_0
-    theta = (1 - agents.gain.rho1 / eta) ** 2 / k
-    combined = drive.combined(agents, theta)
+    graph, alpha, eta = verified.structure.graph, agents.own[1], agents.eta_0
+    combined = drive.combined(agents)
     bounds = list[list[Fraction]]()
     for one in used:
         rate, constants = one.use.function.rate, one.use.error_constants(graph)
-        if constants is not None and rate * k >= 4 and alpha * k >= 1 and rate * k + alpha * k > 5:
-            a, b = alpha - 1 / k, rate / 2 - 2 / k
-            root = root_above(combined.value(graph, one.use.function)) + (1 / k - theta) * one.initial
-            size = rounded(eta**2 * root * max(Fraction(1), (a + alpha) / (a + b)), BITS, up=True)
+        if constants is not None and input_is_bounded(agents.gain.k, rate, alpha):
+            size = input_size(agents, rate, one.initial, root_above(combined.value(graph, one.use.function)))
             spend(40 * graph.n, BITS, BITS, "the input")
             bounds.append([root_above(c) * size for c in constants])
     need(bool(bounds), "a bound of the input though no function and no alpha bound it")

@@ -19,7 +19,10 @@ from fractions import Fraction
 import numpy as np
 
 from ptcc_certify.bounds.input.effort_bounds import full_constants
+from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.input_formulas import root_above
+from ptcc_certify.checker.lyapunov import Function
+from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.model.agents_protocol import AgentsProtocol
@@ -139,6 +142,20 @@ def least_input(
         return math.inf
 
     return min(decaying, key=lambda V: (size(V), -V.proved_rate)).proved_rate
+
+
+def checked_function(V: LyapunovFunction) -> Function:
+    """Return a Lyapunov function as the check reads it, without its constants."""
+    by_rows = (V.nodes, Numbers(V.weights)) if V.form is None else None
+    return Function("", V.proved_rate, Fraction(1), V.form, by_rows)
+
+
+def checked_graph(structure: Structure) -> Digraph:
+    """Return a graph as the check reads it."""
+    rows = structure.graph.exact_rows(range(structure.graph.n_nodes))
+    edges = [(s, t, -row[s]) for t, row in enumerate(rows) for s in sorted(row) if s != t]
+    source, target, weights = zip(*edges, strict=True) if edges else ((), (), ())
+    return Digraph(structure.graph.labels, source, target, weights, 1)
 
 
 def root_product(*factors: Fraction) -> Fraction:

@@ -15,13 +15,12 @@ from itertools import islice
 
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.work import WorkError, limited
-from ptcc_certify.bounds.agents.each_agent import States
+from ptcc_certify.bounds.agents.cascade import checked_agents
+from ptcc_certify.bounds.agents.each_agent import States, checked_function, checked_graph
 from ptcc_certify.checker.agent_bounds import Begin
 from ptcc_certify.checker.agent_cascade import halvings_of, roots_above
 from ptcc_certify.checker.agent_instants import halvings, value_above
-from ptcc_certify.checker.agent_model import Agents, Cascade
-from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.lyapunov import Function
+from ptcc_certify.checker.agent_model import Agents
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.model.agents_protocol import AgentsProtocol
@@ -53,8 +52,8 @@ def instant_values(
     agents = Agents(protocol.order, len(states[0]), protocol.plant, protocol.own, None, protocol.gain.exact, *numbers)
     nodes, found = range(structure.graph.n_nodes), list[Values]()
     with suppress(WorkError), limited(WORK):
-        begin = Begin(agents, _checked(structure), states, protocol.offsets)
-        read = {k: _read(V) for k, V in known.items()}
+        begin = Begin(agents, checked_graph(structure), states, protocol.offsets)
+        read = {k: checked_function(V) for k, V in known.items()}
         graph, deviations = begin.graph, {k: V.deviation.agents for k, V in known.items() if V.deviation is not None}
         for at in islice(halvings(agents, graph.laplacian_product, graph.unit, states, protocol.offsets), INSTANTS):
             values = {k: rounded(value_above(begin, V, at), BITS, up=True) for k, V in read.items()}
@@ -73,10 +72,10 @@ def instant_roots(
     known = {k: V for k, V in enumerate(functions) if V.deviation is not None and V.form is not None}
     if not known:
         return ()
-    agents = Cascade(2, len(states[0]), protocol.plant, protocol.own, None, protocol.gain.exact)
+    agents = checked_agents(protocol)
     nodes, found, remaining = range(structure.graph.n_nodes), list[Values](), Fraction(1)
     with suppress(WorkError), limited(WORK):
-        graph, read = _checked(structure), {k: _read(V) for k, V in known.items()}
+        graph, read = checked_graph(structure), {k: checked_function(V) for k, V in known.items()}
         deviations = {k: V.deviation.agents for k, V in known.items() if V.deviation is not None}
         for at in islice(halvings_of(graph, agents, states, protocol.offsets), INSTANTS):
             remaining /= 2
@@ -85,16 +84,3 @@ def instant_roots(
             told = [roots[k] if k in best else (None, None) for k in range(len(functions))]
             found.append(tuple(None if x is None else rounded(x, BITS, up=True) for pair in told for x in pair))
     return tuple(found)
-
-
-def _read(V: LyapunovFunction) -> Function:
-    """Return a Lyapunov function as the check reads it, without its constants."""
-    return Function("", V.proved_rate, Fraction(1), V.form, None, None)
-
-
-def _checked(structure: Structure) -> Digraph:
-    """Return a graph as the check reads it."""
-    rows = structure.graph.exact_rows(range(structure.graph.n_nodes))
-    edges = [(s, t, -row[s]) for t, row in enumerate(rows) for s in sorted(row) if s != t]
-    source, target, weights = zip(*edges, strict=True) if edges else ((), (), ())
-    return Digraph(structure.graph.labels, source, target, weights, 1)
