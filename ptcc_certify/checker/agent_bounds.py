@@ -122,8 +122,8 @@ class Begin:
     def inverse(self) -> tuple[Matrix, Fraction]:
         """``P = W^-1`` in integers, times a positive number, and that."""
         W, scale = self.agents.scaled_W
-        adjugate, determinant = _adjugate(W)
-        return adjugate, Fraction(determinant, scale)
+        rows, determinant = adjugate(W)
+        return rows, Fraction(determinant, scale)
 
     def value(self, function: Function, at: tuple[list[list[list[int]]], Fraction] | None = None) -> Fraction:
         """Bound ``V = sum_kl Om_kl z_k'P z_l``, summed over the coordinates of space, from above, to many bits.
@@ -203,7 +203,7 @@ class Weights:
         return [sum(map(mul, row, z)) for row in self.matrix]
 
 
-def _adjugate(W: Matrix) -> tuple[Matrix, int]:
+def adjugate(W: Matrix) -> tuple[Matrix, int]:
     """Return ``det(W) W^-1`` and ``det(W)`` of a positive definite integer matrix, by elimination without fractions."""
     n, before = len(W), 1
     bits = n * longest(chain.from_iterable(W))
