@@ -6,15 +6,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import chain
-from operator import mul
 from typing import NamedTuple
 
 from lmi.exact.decimal_rounding import down, up
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.numbers import integers, longest, shorten, sized
 from lmi.exact.work import spend
-from ptcc_certify.checker.agent_bounds import BITS, AgentsInput, Used, UsedSection, Weights, verify_used
-from ptcc_certify.checker.agent_instants import MANY_INSTANTS, Halved, halvings, largest_value
+from ptcc_certify.checker.agent_bounds import BITS, AgentsInput, Used, UsedSection, value_of, verify_used
+from ptcc_certify.checker.agent_instants import Halved, check_instants, halvings, largest_value
 from ptcc_certify.checker.agent_model import LARGEST_DIMENSION, LONGEST, Cascade, within
 from ptcc_certify.checker.agent_motion import States, check_final_states, check_motion, need_shape, sized_offsets
 from ptcc_certify.checker.digraph import Digraph
@@ -22,7 +21,7 @@ from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import RejectedError, length, need
+from ptcc_certify.checker.reading import length, need
 from ptcc_certify.checker.sections import Ball, ByAgent, Positive, Several
 
 
@@ -56,14 +55,7 @@ class Vectors(NamedTuple):
 
     def value(self, graph: Digraph, function: Function) -> Fraction:
         """Bound ``V``, summed over the coordinates of space, from above, to many bits."""
-        form = Weights.of(function)
-        total, unit = 0, 1
-        for x in self.columns:
-            z, unit = form.coordinates(graph, x)
-            u = form.times(z)
-            spend(len(z), longest(z), longest(u), "initial values")
-            total += sum(map(mul, z, u))
-        return rounded(Fraction(total, form.scale * (self.scale * unit) ** 2), BITS, up=True)
+        return value_of(graph, function, [[x] for x in self.columns], self.scale)
 
 
 class Drive(NamedTuple):
@@ -121,7 +113,11 @@ def check_cascade(doc: Document, verified: Verified) -> bool:
             _check_input(doc, verified, agents, used, drive, section.input)
     if "instants" in doc.data:
         need(states is not None, "instants without initial states")
-        _check_instants(doc, graph, agents, used, halvings_of(graph, agents, states or (), offsets))
+
+        def least(k: int, at: Halved, remaining: Fraction) -> tuple[Fraction, Fraction]:
+            return roots_above(graph, agents, used[k].use.function, at, remaining)
+
+        check_instants(doc, halvings_of(graph, agents, states or (), offsets), len(used), 2, least)
     return proved
 
 
@@ -244,23 +240,3 @@ def roots_above(
     spread = root_above(largest_value(graph, function)) * at.off
     roots = [root_above(each.value(graph, function)) for each in (positions, Vectors(combined, at.scale * c))]
     return roots[0] + spread, roots[1] + (1 + g) * spread
-
-
-def _check_instants(
-    doc: Document, graph: Digraph, agents: Cascade, used: Sequence[Tracked], known: Iterator[Halved]
-) -> None:
-    """Verify roots of Lyapunov functions at instants at which the time left is halved."""
-    section, remaining = doc.section("instants"), Fraction(1)
-    need(1 <= len(section) <= MANY_INSTANTS, f"no instants, or more than {MANY_INSTANTS}")
-    doc.open("agent-instants", "instants")
-    for row in section:
-        if (at := next(known, None)) is None:
-            raise RejectedError("the agents are not enclosed at an instant")
-        remaining /= 2
-        need(len(row) == 2 * len(used), f"an instant has not {2 * len(used)} entries")
-        for one, told in zip(used, zip(row[::2], row[1::2], strict=True), strict=True):
-            if any(x is not None for x in told):
-                least = roots_above(graph, agents, one.use.function, at, remaining)
-                holds = all(x is None or x >= y for x, y in zip(told, least, strict=True))
-                need(holds, "a Lyapunov function is larger at an instant")
-    doc.done(f"{len(section)} instants")

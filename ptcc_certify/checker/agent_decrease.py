@@ -119,10 +119,6 @@ def _while_growing(agents: Agents) -> list[Matrix]:
     return decrease_form(agents.scaled_W, agents.rate, A)
 
 
-def _zeros(n: int) -> Rows:
-    return [[Fraction(0)] * n for _ in range(n)]
-
-
 def scaled_matrix(plant: Sequence[Fraction], own: Sequence[Fraction], theta: Fraction, zeta: Fraction) -> Rows:
     """Return ``A_z = N - theta J - b (f + a_z)'``.
 
@@ -142,7 +138,7 @@ def scaled_matrix(plant: Sequence[Fraction], own: Sequence[Fraction], theta: Fra
 def scaled_polynomial(plant: Sequence[Fraction], own: Sequence[Fraction], rho1: Fraction, k: Fraction) -> list[Rows]:
     """Return ``A_z`` as a polynomial in ``zeta`` while the gain grows: ``theta = (1 - rho1 zeta)^2 / k``."""
     n = len(plant)
-    result = [_zeros(n) for _ in range(max(n, 2) + 1)]
+    result = [[[Fraction(0)] * n for _ in range(n)] for _ in range(max(n, 2) + 1)]
     for power, theta in enumerate((1 / k, -2 * rho1 / k, rho1**2 / k)):
         for i in range(n):
             result[power][i][i] -= i * theta
@@ -154,9 +150,7 @@ def scaled_polynomial(plant: Sequence[Fraction], own: Sequence[Fraction], rho1: 
     return result
 
 
-def decrease_form(
-    scaled_W: tuple[Matrix, int], rate: Fraction, A: Sequence[Sequence[Sequence[Fraction]]]
-) -> list[Matrix]:
+def decrease_form(scaled_W: tuple[Matrix, int], rate: Fraction, A: Sequence[Rows]) -> list[Matrix]:
     """Return ``b b' - r W - A_z W - W A_z'`` by powers of ``zeta``, times one positive integer.
 
     ``W`` is in integers over a scale.
