@@ -15,7 +15,7 @@ import numpy as np
 from lmi.exact.decimal_rounding import down, float_up, near, up
 from lmi.exact.elementary_enclosures import sqrt
 from ptcc_certify.bounds.agents.comparison import AgentsComparison
-from ptcc_certify.bounds.agents.each_agent import States, error_constants, first_inputs
+from ptcc_certify.bounds.agents.each_agent import States, error_constants, first_inputs, scaled_states
 from ptcc_certify.bounds.agents.instants import Values
 from ptcc_certify.bounds.agents.motion import Interval
 from ptcc_certify.bounds.final_state.enclosed_ends import agents_ends, weighted_sum
@@ -129,6 +129,11 @@ class AgentsAnswer(ABC):
         return any(m or r for agent in self.final_state or () for chain in agent for m, r in chain[1:])
 
     @property
+    def begins_moving(self) -> bool:
+        """Whether some initial velocity is not 0."""
+        return any(chain[1] for agent in self.initial_state or () for chain in agent)
+
+    @property
     def longest_way(self) -> float:
         """The longest way of an agent from its initial to its final position (numerical); 0 without a final state."""
         begin, end = self.initial_state or (), self.final_state or ()
@@ -168,8 +173,7 @@ class AgentsAnswer(ABC):
         """Whether the input of agents alone grows without limit: some move, and ``alpha rho2 kappa < 1``."""
         if not self.alone or not any(self.protocol.own):
             return False
-        moving = any(chain[1] for agent in self.initial_state or () for chain in agent)
-        return moving and self.protocol.own[1] * self.protocol.gain.pole < 1
+        return self.begins_moving and self.protocol.own[1] * self.protocol.gain.pole < 1
 
     @cached_property
     def inputs(self) -> tuple[Fraction, ...] | None:
@@ -322,13 +326,10 @@ def final_states(part: AgentsAnswer, influence: Influence) -> Intervals | None:
     """Return where the agents end, with their velocities and so on; None if it is not enclosed in a large graph."""
     if not influence.exact and influence.enclosure is None:
         return None
-    offsets, zero = part.protocol.offsets, Fraction(0)
-    coordinates = []
+    offsets, coordinates = part.protocol.offsets, []
+    states = scaled_states(part.initial_state or (), offsets, Fraction(1))
     for q in range(part.dimension):
-        begin = [
-            [(x - (h[q] if i == 0 else 0), zero) for i, x in enumerate(agent[q])]
-            for agent, h in zip(part.initial_state or (), offsets, strict=True)
-        ]
+        begin = [[(x, Fraction(0)) for x in agent[q]] for agent in states]
         try:
             columns = [agents_ends(influence, [weighted_sum(row, chain) for chain in begin]) for row in part.motion]
         except NotEnclosedError:

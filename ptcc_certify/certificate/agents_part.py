@@ -13,7 +13,14 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import counted, down, float_down, float_up, near, up
 from ptcc_certify.bounds.agents.comparison import AgentsComparison, compare_agents
-from ptcc_certify.bounds.agents.each_agent import States, initial_value, least_input, root_product, scaled_states
+from ptcc_certify.bounds.agents.each_agent import (
+    States,
+    checked_function,
+    checked_graph,
+    least_input,
+    root_product,
+    scaled_states,
+)
 from ptcc_certify.bounds.agents.instants import instant_values
 from ptcc_certify.bounds.agents.motion import common_motion
 from ptcc_certify.bounds.final_state.enclosed_ends import agents_ends
@@ -22,8 +29,9 @@ from ptcc_certify.bounds.float_conversion import numbers
 from ptcc_certify.bounds.input.tightest_bound import round_up
 from ptcc_certify.certificate.agents_answer import AgentsAnswer, Residual, final_states, read, rows_of, use, written
 from ptcc_certify.certificate.cascade_part import prove_cascade, read_cascade
-from ptcc_certify.checker.agent_bounds import ResidualSection, UsedSection
+from ptcc_certify.checker.agent_bounds import Begin, ResidualSection, UsedSection
 from ptcc_certify.checker.agent_cascade import CascadeSection
+from ptcc_certify.checker.agent_model import Agents as ChainsAndMatrix
 from ptcc_certify.checker.agents import AgentsSection
 from ptcc_certify.checker.input_formulas import Limits, decay_above
 from ptcc_certify.checker.obligations import CheckReport
@@ -98,12 +106,19 @@ class AgentsPart(AgentsAnswer):
         return tuple(found)
 
     @cached_property
+    def begin(self) -> Begin:
+        """Where the agents begin, as the check reads it."""
+        protocol, matrix, states = self.protocol, self.matrix, self.initial_state or ()
+        numbers = protocol.gains, matrix.coupling, matrix.W, matrix.rate, matrix.points
+        chains = self.order, self.dimension, protocol.plant, protocol.own, protocol.gain_cap, protocol.gain.exact
+        return Begin(ChainsAndMatrix(*chains, *numbers), checked_graph(self.structure), states, protocol.offsets)
+
+    @cached_property
     def initial_values(self) -> tuple[Fraction, ...]:
         """``V(0)`` of every function used."""
         if self.initial_state is None:
             return ()
-        scaled = scaled_states(self.initial_state, self.protocol.offsets, 1 / self.protocol.first_gain)
-        return tuple(initial_value(self.structure, V, self.matrix.inverse, scaled) for V in self.functions)
+        return tuple(self.begin.value(checked_function(V)) for V in self.functions)
 
     @property
     def obligations(self) -> list[Obligation]:
@@ -202,9 +217,7 @@ class AgentsPart(AgentsAnswer):
     @property
     def in_place(self) -> bool:
         """Whether agents begin in agreement, with a common motion: then nothing steers them but to rest."""
-        own = any(self.protocol.own)
-        braked = own and any(chain[1] for agent in self.initial_state or () for chain in agent)
-        return not any(self.initial_values) and not braked
+        return not any(self.initial_values) and not (any(self.protocol.own) and self.begins_moving)
 
     @property
     def bounding_rho2(self) -> Fraction | None:
@@ -314,8 +327,7 @@ def with_instants(part: AgentsPart) -> AgentsPart:
     """Add what functions are worth at instants nearer to the deadline."""
     if part.order < 2 or part.initial_state is None or not any(part.initial_values):
         return part
-    values = instant_values(part.structure, part.protocol, part.matrix, part.functions, part.initial_state)
-    return replace(part, instants=values)
+    return replace(part, instants=instant_values(part.begin, part.functions))
 
 
 def _coupling(rate: Fraction) -> Fraction:

@@ -110,8 +110,7 @@ class CascadePart(AgentsAnswer):
     @property
     def in_place(self) -> bool:
         """Whether agents begin in agreement, at rest."""
-        moving = any(chain[1] for agent in self.initial_state or () for chain in agent)
-        return not moving and not any(x for root in self.roots for x in root)
+        return not self.begins_moving and not any(x for root in self.roots for x in root)
 
     @property
     def gains_text(self) -> str:

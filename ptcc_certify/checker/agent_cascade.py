@@ -15,7 +15,7 @@ from lmi.exact.work import spend
 from ptcc_certify.checker.agent_bounds import BITS, AgentsInput, Used, UsedSection, value_of, verify_used
 from ptcc_certify.checker.agent_instants import Halved, check_instants, halvings, largest_value
 from ptcc_certify.checker.agent_model import LARGEST_DIMENSION, LONGEST, Cascade, within
-from ptcc_certify.checker.agent_motion import States, check_final_states, check_motion, need_shape, sized_offsets
+from ptcc_certify.checker.agent_motion import States, check_ends, need_shape, sized_offsets
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.input_formulas import root_above
@@ -97,15 +97,8 @@ def check_cascade(doc: Document, verified: Verified) -> bool:
     need_shape(states, "initial_state", agents)
     drive = None if states is None else drive_of(graph, agents, states, offsets)
     used = _functions(doc, verified, section, drive)
-    doc.at = "agents.motion"
-    M = check_motion(doc, agents, section.motion)
-    doc.at = "agents.final_state"
-    moves = bool(graph.listening)
-    proved = doc.sections["influence"] is not None and (bool(used) or not moves)
-    if section.final_state is not None:
-        need(proved and states is not None, "a final state without initial states or a proof")
-        rests = not moves or any(one.use.function.rate * gain.k > 2 for one in used)
-        check_final_states(doc, agents, verified.final, M[: 1 + rests], states or (), offsets, section.final_state)
+    rests = not graph.listening or any(one.use.function.rate * gain.k > 2 for one in used)
+    proved = check_ends(doc, agents, verified.final, section, bool(used), 1 + rests)
     doc.at = "agents.input"
     if section.input is not None:
         need(drive is not None, "a bound of the input without initial states")

@@ -40,6 +40,30 @@ def check_motion(doc: Document, agents: Chains, M: Sequence[Sequence[Interval]])
     return M
 
 
+def check_ends(
+    doc: Document, agents: Chains, final: FinalState, section: Any, decays: bool, derivatives: int | None = None
+) -> bool:
+    """Verify the common motion and the final states; return whether agreement and where it happens were proved.
+
+    Parameters
+    ----------
+    section : AgentsSection or CascadeSection
+    decays : bool
+        Whether a Lyapunov function is used.
+    derivatives : int, optional
+        Of how many final values may be told; by default of all.
+    """
+    doc.at = "agents.motion"
+    M = check_motion(doc, agents, section.motion)
+    doc.at = "agents.final_state"
+    proved = doc.sections["influence"] is not None and (decays or not final.structure.graph.listening)
+    if section.final_state is not None:
+        states = section.initial_state
+        need(states is not None and proved, "a final state without initial states or a proof")
+        check_final_states(doc, agents, final, M[:derivatives], states, section.offsets, section.final_state)
+    return proved
+
+
 def motion_of(agents: Chains, bits: int = BITS) -> tuple[list[list[Interval]], Fraction]:
     """Return ends of the entries of ``M``, and how far it may be beyond them."""
     n, T = agents.n, agents.gain.T

@@ -21,7 +21,7 @@ from ptcc_certify.checker.agent_cascade import check_cascade
 from ptcc_certify.checker.agent_decrease import check_decrease, check_phases
 from ptcc_certify.checker.agent_instants import Halved, check_instants, halvings, value_above
 from ptcc_certify.checker.agent_model import Agents, OneAgent, agents_of
-from ptcc_certify.checker.agent_motion import check_final_states, check_motion, need_shape, sized_offsets
+from ptcc_certify.checker.agent_motion import check_ends, need_shape, sized_offsets
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, length, need
@@ -63,17 +63,7 @@ def check_agents(doc: Document, verified: Verified) -> bool:
     for entry in section.functions:
         used.append(verify_used(doc, verified, entry, used[-1].number if used else -1))
     check_decrease(doc, agents, [use.function for use in used])
-    doc.at = "agents.motion"
-    M = check_motion(doc, agents, section.motion)
-    doc.at = "agents.final_state"
-    final = verified.final
-    proved = doc.sections["influence"] is not None and (bool(used) or not graph.listening)
-    need(
-        (begin is not None and proved) or section.final_state is None,
-        "a final state without initial states or a proof",
-    )
-    if begin is not None and section.final_state is not None:
-        check_final_states(doc, agents, final, M, begin.states, offsets, section.final_state)
+    proved = check_ends(doc, agents, verified.final, section, bool(used))
     _bounds(doc, verified, section, agents, begin, used)
     check_phases(doc, agents, used)
     if "instants" in doc.data:

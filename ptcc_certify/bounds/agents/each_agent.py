@@ -50,32 +50,6 @@ def scaled_states(states: States, offsets: Sequence[Sequence[Fraction]], zeta: F
     )
 
 
-def initial_value(structure: Structure, V: LyapunovFunction, P: Matrix, scaled: States) -> Fraction:
-    """Return ``V = sum_kl Om_kl z_k'P z_l`` of scaled states, summed over the coordinates of space."""
-    rows, n = structure.graph.exact_rows(range(structure.graph.n_nodes)), len(P)
-    total = Fraction(0)
-    for q in range(len(scaled[0])):
-        columns = []
-        for i in range(n):
-            x = [agent[q][i] for agent in scaled]
-            error = [-sum((a * x[j] for j, a in row.items()), Fraction(0)) for row in rows]
-            columns.append(V.exact_coordinates_of(x, error))
-        for i in range(n):
-            for j in range(i + 1):
-                total += (1 + (i != j)) * P[i][j] * _product(V, columns[i], columns[j])
-    return total
-
-
-def _product(V: LyapunovFunction, x: Sequence[Fraction], y: Sequence[Fraction]) -> Fraction:
-    """Return ``x' Om y``."""
-    if V.matrix is None:
-        return sum((w * a * b for w, a, b in zip(V.weights, x, y, strict=True)), Fraction(0))
-    parts = (
-        a * sum((p * b for p, b in zip(row, y, strict=True)), Fraction(0)) for a, row in zip(x, V.matrix, strict=True)
-    )
-    return sum(parts, Fraction(0))
-
-
 def first_inputs(structure: Structure, protocol: AgentsProtocol, states: States) -> tuple[Fraction, ...]:
     """Return the squares of ``|u_k(0)|``, the inputs at time 0 without sliding terms, exactly.
 
