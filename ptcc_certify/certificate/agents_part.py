@@ -15,8 +15,8 @@ from lmi.exact.decimal_rounding import counted, down, float_down, float_up, near
 from ptcc_certify.bounds.agents.comparison import AgentsComparison, compare_agents
 from ptcc_certify.bounds.agents.each_agent import (
     States,
+    checked_begin,
     checked_function,
-    checked_graph,
     least_input,
     root_product,
     scaled_states,
@@ -29,9 +29,9 @@ from ptcc_certify.bounds.float_conversion import numbers
 from ptcc_certify.bounds.input.tightest_bound import round_up
 from ptcc_certify.certificate.agents_answer import AgentsAnswer, Residual, final_states, read, rows_of, use, written
 from ptcc_certify.certificate.cascade_part import prove_cascade, read_cascade
+from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.checker.agent_bounds import Begin, ResidualSection, UsedSection
 from ptcc_certify.checker.agent_cascade import CascadeSection
-from ptcc_certify.checker.agent_model import Agents as ChainsAndMatrix
 from ptcc_certify.checker.agents import AgentsSection
 from ptcc_certify.checker.input_formulas import Limits, decay_above
 from ptcc_certify.checker.obligations import CheckReport
@@ -108,10 +108,7 @@ class AgentsPart(AgentsAnswer):
     @cached_property
     def begin(self) -> Begin:
         """Where the agents begin, as the check reads it."""
-        protocol, matrix, states = self.protocol, self.matrix, self.initial_state or ()
-        numbers = protocol.gains, matrix.coupling, matrix.W, matrix.rate, matrix.points
-        chains = self.order, self.dimension, protocol.plant, protocol.own, protocol.gain_cap, protocol.gain.exact
-        return Begin(ChainsAndMatrix(*chains, *numbers), checked_graph(self.structure), states, protocol.offsets)
+        return checked_begin(self.structure, self.protocol, self.matrix, self.initial_state or ())
 
     @cached_property
     def initial_values(self) -> tuple[Fraction, ...]:
@@ -245,11 +242,9 @@ class AgentsPart(AgentsAnswer):
 
 
 def prove_agents(
-    structure: Structure,
+    proof: GraphProof,
     base: Protocol,
     agents: Agents,
-    functions: Sequence[LyapunovFunction],
-    influence: Influence,
     offsets: Sequence[Sequence[Fraction]],
     initial_state: States | None,
 ) -> AgentsAnswer:
@@ -259,13 +254,12 @@ def prove_agents(
 
     Parameters
     ----------
-    structure : Structure
+    proof : GraphProof
+        Of the graph; of its functions the one that makes inputs smallest decides the coupling, faster ones are used
+        besides.
     base : Protocol
         Gain, clock and deadline.
     agents : Agents
-    functions : sequence of LyapunovFunction
-        Proved; the one that makes inputs smallest decides the coupling, and faster ones are used besides.
-    influence : Influence
     offsets : N rows of d Fraction
     initial_state : N tuples of d tuples of n Fraction, or None
 
@@ -275,8 +269,8 @@ def prove_agents(
         No matrix for one agent was found.
     """
     if agents.cascade is not None:
-        return prove_cascade(structure, base, agents, functions, influence, offsets, initial_state)
-    gain = base.gain
+        return prove_cascade(proof, base, agents, offsets, initial_state)
+    structure, functions, gain = proof.structure, proof.functions, base.gain
     proved = [V.proved_rate for V in functions]
     best = max((rate for rate in proved if rate > 0), default=None)
     scaled = ScaledAgent(agents.coefficients, agents.own, gain.rho1, gain.pole, gain.first, agents.cap)
@@ -303,8 +297,8 @@ def prove_agents(
         **use(structure, functions, used),
     )
     decided = initial_state is not None and bool(used or not structure.graph.n_edges)
-    final = final_states(part, influence) if decided else None
-    return replace(part, final_state=final, residual=_residual(part), input=_input(part, influence))
+    final = final_states(part, proof.influence) if decided else None
+    return replace(part, final_state=final, residual=_residual(part), input=_input(part, proof.influence))
 
 
 def with_phases(part: AgentsPart) -> AgentsPart:

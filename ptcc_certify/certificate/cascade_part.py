@@ -12,11 +12,11 @@ from lmi.exact.decimal_rounding import down, float_down, float_up, near, up
 from ptcc_certify.bounds.agents.cascade import Roots, course, drive_integral, input_from, roots_of
 from ptcc_certify.bounds.agents.comparison import AgentsComparison, compare_with_bounds
 from ptcc_certify.bounds.agents.each_agent import States, root_product
-from ptcc_certify.bounds.agents.instants import instant_roots
+from ptcc_certify.bounds.agents.instants import Values, instant_roots
 from ptcc_certify.bounds.agents.motion import LARGEST_DECAY, common_motion
-from ptcc_certify.bounds.final_state.of_graph import Influence
 from ptcc_certify.bounds.float_conversion import numbers
 from ptcc_certify.certificate.agents_answer import AgentsAnswer, final_states, read, rows_of, use, written
+from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.checker.agent_cascade import CascadeSection, TrackedSection, input_is_bounded
 from ptcc_certify.errors import Change, ParameterError, Sentence
 from ptcc_certify.graphs.structure import Structure
@@ -242,11 +242,9 @@ class CascadePart(AgentsAnswer):
 
 
 def prove_cascade(
-    structure: Structure,
+    proof: GraphProof,
     base: Protocol,
     agents: Agents,
-    functions: Sequence[LyapunovFunction],
-    influence: Influence,
     offsets: Sequence[Sequence[Fraction]],
     initial_state: States | None,
 ) -> CascadePart:
@@ -254,13 +252,12 @@ def prove_cascade(
 
     Parameters
     ----------
-    structure : Structure
+    proof : GraphProof
+        Of the graph; its Lyapunov functions are used.
     base : Protocol
         Gain, clock and deadline.
     agents : Agents
         With ``cascade``.
-    functions : sequence of LyapunovFunction
-    influence : Influence
     offsets : N rows of d Fraction
     initial_state : N tuples of d tuples of 2 Fraction, or None
 
@@ -276,20 +273,21 @@ def prove_cascade(
             f"= {near(agents.alpha)} is too large to enclose the common motion: beyond "
             f"{LARGEST_DECAY}/(rho1 T); take at most {down(LARGEST_DECAY / falls, 4)}",
         )
-    fields = use(structure, functions, [k for k, V in enumerate(functions) if V.proved_rate > 0])
+    fields = use(proof.structure, proof.functions, [k for k, V in enumerate(proof.functions) if V.proved_rate > 0])
     protocol = CascadeProtocol.of(base, agents.alpha, offsets)
     roots: tuple[Roots, ...] = ()
     if initial_state is not None:
-        roots = roots_of(structure, protocol, fields["functions"], initial_state)
+        roots = roots_of(proof.structure, protocol, fields["functions"], initial_state)
     motion = common_motion(agents.coefficients, agents.own, base.gain)
     part = CascadePart(protocol=protocol, roots=roots, initial_state=initial_state, motion=motion, **fields)
     final = None
     if initial_state is not None and part.settles:
-        final = final_states(part, influence)
+        final = final_states(part, proof.influence)
         if final is not None and not part.derivatives_agree:
             final = tuple(tuple(chain[:1] for chain in agent) for agent in final)
-    begins = initial_state is not None and any(root.state or root.drive for root in roots)
-    instants = instant_roots(structure, protocol, part.functions, initial_state) if initial_state and begins else ()
+    instants: tuple[Values, ...] = ()
+    if initial_state is not None and any(root.state or root.drive for root in roots):
+        instants = instant_roots(proof.structure, protocol, part.functions, initial_state)
     return replace(part, final_state=final, input=_input(part), instants=instants)
 
 

@@ -92,17 +92,8 @@ SETTLED = 1e-6
 
 def with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: bool) -> Certificate:
     """Return the certificate of a graph as one of agents of order n on it."""
-    functions = certificate.graph_proof.functions
     try:
-        proof = prove_agents(
-            certificate.graph_proof.structure,
-            certificate.protocol,
-            agents,
-            functions,
-            certificate.graph_proof.influence,
-            chains.offsets,
-            chains.states,
-        )
+        proof = prove_agents(certificate.graph_proof, certificate.protocol, agents, chains.offsets, chains.states)
     except NoCertificate as error:
         raise ParameterError("agents", f"{error}; ask for a smaller decay or a lower order") from None
     proof = with_instants(with_phases(proof)) if isinstance(proof, AgentsPart) else proof

@@ -110,15 +110,8 @@ class Search:
         first, protocol = self.base.proof.agents, at_deadline(self.template, T)
         assert first is not None
         try:
-            part = prove_agents(
-                self.base.graph_proof.structure,
-                protocol,
-                self.agents,
-                self.base.graph_proof.functions,
-                self.base.graph_proof.influence,
-                first.protocol.offsets,
-                first.initial_state,
-            )
+            states = first.protocol.offsets, first.initial_state
+            part = prove_agents(self.base.graph_proof, protocol, self.agents, *states)
         except NoCertificate:
             return None
         return Candidate(T, protocol, part)

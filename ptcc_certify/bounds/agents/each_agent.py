@@ -19,6 +19,8 @@ from fractions import Fraction
 import numpy as np
 
 from ptcc_certify.bounds.input.effort_bounds import full_constants
+from ptcc_certify.checker.agent_bounds import Begin
+from ptcc_certify.checker.agent_model import Agents
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.checker.lyapunov import Function
@@ -26,7 +28,7 @@ from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.model.agents_protocol import AgentsProtocol
-from ptcc_certify.theorems.agent_decrease import Matrix
+from ptcc_certify.theorems.agent_decrease import AgentMatrix, Matrix
 
 #: Of every agent, in every coordinate of space, its position, velocity and so on.
 States = tuple[tuple[tuple[Fraction, ...], ...], ...]
@@ -116,6 +118,14 @@ def least_input(
         return math.inf
 
     return min(decaying, key=lambda V: (size(V), -V.proved_rate)).proved_rate
+
+
+def checked_begin(structure: Structure, protocol: AgentsProtocol, matrix: AgentMatrix, states: States) -> Begin:
+    """Return where agents of order n begin, as the check reads it."""
+    numbers = protocol.gains, matrix.coupling, matrix.W, matrix.rate, matrix.points
+    chains = protocol.order, len(protocol.offsets[0]), protocol.plant, protocol.own, protocol.gain_cap
+    agents = Agents(*chains, protocol.gain.exact, *numbers)
+    return Begin(agents, checked_graph(structure), states, protocol.offsets)
 
 
 def checked_function(V: LyapunovFunction) -> Function:
