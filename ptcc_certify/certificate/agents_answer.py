@@ -15,19 +15,23 @@ import numpy as np
 from lmi.exact.decimal_rounding import down, float_up, near, up
 from lmi.exact.elementary_enclosures import sqrt
 from ptcc_certify.bounds.agents.comparison import AgentsComparison
-from ptcc_certify.bounds.agents.each_agent import States, first_inputs
+from ptcc_certify.bounds.agents.each_agent import States, error_constants, first_inputs, scaled_states
+from ptcc_certify.bounds.agents.instants import Values
 from ptcc_certify.bounds.agents.motion import Interval
 from ptcc_certify.bounds.final_state.enclosed_ends import agents_ends, weighted_sum
 from ptcc_certify.bounds.final_state.of_graph import Influence, NotEnclosedError
 from ptcc_certify.bounds.float_conversion import fractions
 from ptcc_certify.certificate.exit_code import MET, OPEN, REFUTED, Answer
-from ptcc_certify.checker.agent_bounds import AgentsInput, UsedSection
+from ptcc_certify.checker.agent_bounds import AgentsInput
+from ptcc_certify.checker.agent_cascade import CascadeSection
+from ptcc_certify.checker.agents import AgentsSection
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.errors import Change, ParameterError, Sentence
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.model.agents_protocol import AgentsProtocol
 from ptcc_certify.simulation.agents import AgentsTrajectory, simulate_agents
+from ptcc_certify.theorems.agent_decrease import Phase
 from ptcc_certify.theorems.theorem import Obligation
 
 Intervals = tuple[tuple[tuple[Interval, ...], ...], ...]
@@ -49,6 +53,7 @@ class Residual:
     agents: tuple[tuple[Fraction, ...], ...]
 
 
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class AgentsAnswer(ABC):
     """What is proved of agents of order n.
 
@@ -57,6 +62,7 @@ class AgentsAnswer(ABC):
     structure : Structure
     protocol : AgentsProtocol
         As the agents run it.
+    used : tuple of UsedFunction
     functions : tuple of LyapunovFunction
         Those that are used.
     initial_state : N tuples of d tuples of n Fraction, or None
@@ -69,16 +75,23 @@ class AgentsAnswer(ABC):
         What a bounded gain leaves at ``T``.
     input : tuple of N Fraction, or None
         Bounds of the Euclidean norm of every agent's input.
+    phases : tuple of Phase
+        Faster decrease of single functions, nearer to the deadline.
+    instants : tuple of tuples of Fraction or None
+        What functions used are worth at most at ``1 - t/T = 1/2, 1/4, ..``.
     """
 
     structure: Structure
     protocol: AgentsProtocol
+    used: tuple[UsedFunction, ...]
     functions: tuple[LyapunovFunction, ...]
     initial_state: States | None
     motion: tuple[tuple[Interval, ...], ...]
-    final_state: Intervals | None
-    residual: Residual | None
-    input: tuple[Fraction, ...] | None
+    final_state: Intervals | None = None
+    residual: Residual | None = None
+    input: tuple[Fraction, ...] | None = None
+    phases: tuple[Phase, ...] = ()
+    instants: tuple[Values, ...] = ()
 
     @property
     def order(self) -> int:
@@ -116,6 +129,11 @@ class AgentsAnswer(ABC):
         return any(m or r for agent in self.final_state or () for chain in agent for m, r in chain[1:])
 
     @property
+    def begins_moving(self) -> bool:
+        """Whether some initial velocity is not 0."""
+        return any(chain[1] for agent in self.initial_state or () for chain in agent)
+
+    @property
     def longest_way(self) -> float:
         """The longest way of an agent from its initial to its final position (numerical); 0 without a final state."""
         begin, end = self.initial_state or (), self.final_state or ()
@@ -126,6 +144,18 @@ class AgentsAnswer(ABC):
         return max(ways, default=0.0)
 
     # ------------------------------------------------------------------ input
+
+    @cached_property
+    def error_constants(self) -> tuple[tuple[Fraction, ...] | None, ...]:
+        """``c_k^E`` of every function used."""
+        pairs = zip(self.used, self.functions, strict=True)
+        return tuple(one.inputs if V.matrix is not None else error_constants(self.structure, V) for one, V in pairs)
+
+    @property
+    def sliding_terms(self) -> Fraction:
+        """What the sliding terms add to an input at most."""
+        reaching = self.protocol.base.reaching
+        return Fraction(0) if reaching is None else reaching.mu1 * self.dimension
 
     @property
     def alone(self) -> bool:
@@ -143,8 +173,7 @@ class AgentsAnswer(ABC):
         """Whether the input of agents alone grows without limit: some move, and ``alpha rho2 kappa < 1``."""
         if not self.alone or not any(self.protocol.own):
             return False
-        moving = any(chain[1] for agent in self.initial_state or () for chain in agent)
-        return moving and self.protocol.own[1] * self.protocol.gain.pole < 1
+        return self.begins_moving and self.protocol.own[1] * self.protocol.gain.pole < 1
 
     @cached_property
     def inputs(self) -> tuple[Fraction, ...] | None:
@@ -155,15 +184,14 @@ class AgentsAnswer(ABC):
         """
         if self.input is not None or not self.alone:
             return self.input
-        base, forces = self.protocol.base, abs(self.protocol.plant[0])
-        extra = base.reaching.mu1 * self.dimension if base.reaching is not None else Fraction(0)
+        forces = abs(self.protocol.plant[0])
         if not any(self.protocol.own):
             squares = tuple(forces**2 * sum((x * x for x in h), Fraction(0)) for h in self.protocol.offsets)
         elif self.initial_state is None or self.protocol.own[1] < self.least_rest:
             return None
         else:
             squares = first_inputs(self.structure, self.protocol, self.initial_state)
-        return tuple(_root(x)[1] + extra for x in squares)
+        return tuple(_root(x)[1] + self.sliding_terms for x in squares)
 
     def judge_input(self, most: Fraction) -> Answer:
         """Tell whether every input is proved to stay within so much, or exceeds it at time 0, exactly."""
@@ -205,6 +233,11 @@ class AgentsAnswer(ABC):
             raise ParameterError("the certificate has no initial state; certify the graph with x0")
         states = [[[float(x) for x in chain] for chain in agent] for agent in self.initial_state]
         return simulate_agents(self.structure.graph, self.protocol, states, self.weighing_rate, **options)
+
+    @property
+    @abstractmethod
+    def _summary(self) -> str:
+        """What a representation tells of the protocol."""
 
     @property
     @abstractmethod
@@ -253,6 +286,11 @@ class AgentsAnswer(ABC):
 
     @property
     @abstractmethod
+    def section(self) -> AgentsSection | CascadeSection:
+        """The section ``agents``."""
+
+    @property
+    @abstractmethod
     def obligations(self) -> list[Obligation]:
         """What proves the decay: obligations with numbers or a witness."""
 
@@ -273,6 +311,10 @@ class AgentsAnswer(ABC):
     def compare(self, run: AgentsTrajectory) -> AgentsComparison | None:
         """Compare a run with what is proved of it; None where nothing disagrees."""
 
+    def __repr__(self) -> str:
+        size = "" if self.input is None else f", {self.norm} <= {up(max(self.input), 4)}"
+        return f"{type(self).__name__}({self._summary}{size})"
+
 
 def _root(square: Fraction) -> Interval:
     """Enclose a root, in one number where it is rational."""
@@ -284,13 +326,10 @@ def final_states(part: AgentsAnswer, influence: Influence) -> Intervals | None:
     """Return where the agents end, with their velocities and so on; None if it is not enclosed in a large graph."""
     if not influence.exact and influence.enclosure is None:
         return None
-    offsets, zero = part.protocol.offsets, Fraction(0)
-    coordinates = []
+    offsets, coordinates = part.protocol.offsets, []
+    states = scaled_states(part.initial_state or (), offsets, Fraction(1))
     for q in range(part.dimension):
-        begin = [
-            [(x - (h[q] if i == 0 else 0), zero) for i, x in enumerate(agent[q])]
-            for agent, h in zip(part.initial_state or (), offsets, strict=True)
-        ]
+        begin = [[(x, Fraction(0)) for x in agent[q]] for agent in states]
         try:
             columns = [agents_ends(influence, [weighted_sum(row, chain) for chain in begin]) for row in part.motion]
         except NotEnclosedError:
@@ -305,14 +344,39 @@ def final_states(part: AgentsAnswer, influence: Influence) -> Intervals | None:
     )
 
 
-def inputs_section(bounds: Sequence[Fraction] | None) -> AgentsInput | None:
-    """Return bounds of the input of every agent."""
-    return None if bounds is None else AgentsInput(agents=Numbers(bounds), largest=max(bounds))
+def use(structure: Structure, functions: Sequence[LyapunovFunction], chosen: Sequence[int]) -> dict[str, Any]:
+    """Return the fields of an answer that tell which functions of a graph are used: those of some numbers."""
+    used = tuple(functions[k] for k in chosen)
+    constants = [error_constants(structure, V) if V.matrix is not None else None for V in used]
+    return {"structure": structure, "used": tuple(map(UsedFunction, chosen, constants)), "functions": used}
 
 
-def used_of(functions: Sequence[UsedSection]) -> tuple[UsedFunction, ...]:
-    """Return the functions that are used."""
-    return tuple(UsedFunction(one.function, fractions(one.inputs)) for one in functions)
+def written(part: AgentsAnswer) -> dict[str, Any]:
+    """Return what sections of all agents have."""
+    bounds = part.input
+    return {
+        "dimension": part.dimension,
+        "offsets": part.protocol.offsets,
+        "initial_state": part.initial_state,
+        "motion": part.motion,
+        "final_state": part.final_state,
+        "input": None if bounds is None else AgentsInput(agents=Numbers(bounds), largest=max(bounds)),
+    }
+
+
+def read(
+    section: AgentsSection | CascadeSection, structure: Structure, functions: Sequence[LyapunovFunction]
+) -> dict[str, Any]:
+    """Return the fields of an answer that sections of all agents have."""
+    return {
+        "structure": structure,
+        "used": tuple(UsedFunction(one.function, fractions(one.inputs)) for one in section.functions),
+        "functions": tuple(functions[one.function] for one in section.functions),
+        "initial_state": states_of(section.initial_state),
+        "motion": rows_of(section.motion),
+        "final_state": states_of(section.final_state),
+        "input": None if section.input is None else tuple(section.input.agents),
+    }
 
 
 def rows_of(rows: Sequence[Sequence[Any]]) -> tuple[tuple[Any, ...], ...]:
@@ -323,8 +387,3 @@ def rows_of(rows: Sequence[Sequence[Any]]) -> tuple[tuple[Any, ...], ...]:
 def states_of(states: Sequence[Sequence[Sequence[Any]]] | None) -> tuple[tuple[tuple[Any, ...], ...], ...] | None:
     """Return states of agents as tuples; None of None."""
     return None if states is None else tuple(map(rows_of, states))
-
-
-def bounds_of(section: AgentsInput | None) -> tuple[Fraction, ...] | None:
-    """Return bounds of the inputs; None if there are none."""
-    return None if section is None else tuple(section.agents)

@@ -15,34 +15,26 @@ from lmi.exact.decimal_rounding import counted, down, float_down, float_up, near
 from ptcc_certify.bounds.agents.comparison import AgentsComparison, compare_agents
 from ptcc_certify.bounds.agents.each_agent import (
     States,
-    error_constants,
-    initial_value,
+    checked_begin,
+    checked_function,
     least_input,
     root_product,
     scaled_states,
 )
-from ptcc_certify.bounds.agents.instants import Values, instant_values
-from ptcc_certify.bounds.agents.motion import Interval, common_motion
+from ptcc_certify.bounds.agents.instants import instant_values
+from ptcc_certify.bounds.agents.motion import common_motion
 from ptcc_certify.bounds.final_state.enclosed_ends import agents_ends
 from ptcc_certify.bounds.final_state.of_graph import Influence
 from ptcc_certify.bounds.float_conversion import numbers
 from ptcc_certify.bounds.input.tightest_bound import round_up
-from ptcc_certify.certificate.agents_answer import (
-    AgentsAnswer,
-    Intervals,
-    Residual,
-    UsedFunction,
-    bounds_of,
-    final_states,
-    inputs_section,
-    rows_of,
-    states_of,
-    used_of,
-)
-from ptcc_certify.checker.agent_bounds import ResidualSection, UsedSection
-from ptcc_certify.checker.agent_decrease import PhaseSection
+from ptcc_certify.certificate.agents_answer import AgentsAnswer, Residual, final_states, read, rows_of, use, written
+from ptcc_certify.certificate.cascade_part import prove_cascade, read_cascade
+from ptcc_certify.certificate.graph_proof import GraphProof
+from ptcc_certify.checker.agent_bounds import Begin, ResidualSection, UsedSection
+from ptcc_certify.checker.agent_cascade import CascadeSection
 from ptcc_certify.checker.agents import AgentsSection
 from ptcc_certify.checker.input_formulas import Limits, decay_above
+from ptcc_certify.checker.obligations import CheckReport
 from ptcc_certify.errors import Change, Sentence
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
@@ -63,47 +55,19 @@ from ptcc_certify.theorems.agent_decrease import (
 from ptcc_certify.theorems.theorem import Obligation
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class AgentsPart(AgentsAnswer):
-    """What is proved of agents of order n.
+    """What is proved of agents of order n by one matrix; see :class:`AgentsAnswer`.
 
     Attributes
     ----------
-    structure : Structure
-    protocol : AgentsProtocol
-        As the agents run it.
     matrix : AgentMatrix
         ``W``, the rate ``r`` and the gains, proved.
-    used : tuple of UsedFunction
-    functions : tuple of LyapunovFunction
-        Those that are used.
-    initial_state : N tuples of d tuples of n Fraction, or None
-        Position, velocity and so on of every agent in every coordinate.
-    motion : n by n intervals
-        ``M``: the common motion from 0 to ``T``.
-    final_state : like initial_state, with intervals, or None
-    residual : Residual or None
-    input : tuple of N Fraction, or None
-        Bounds of the Euclidean norm of every agent's input.
-    phases : tuple of Phase
-        Faster decrease of single functions, nearer to the deadline.
     instants : tuple of tuples of Fraction or None
-        Bounds of ``V`` of functions used, at ``1 - t/T = 1/2, 1/4, ..``; none larger at later instants than its decay
-        tells.
+        Bounds of ``V`` of functions used; none larger at later instants than its decay tells.
     """
 
-    structure: Structure
-    protocol: AgentsProtocol
     matrix: AgentMatrix
-    used: tuple[UsedFunction, ...]
-    functions: tuple[LyapunovFunction, ...]
-    initial_state: States | None
-    motion: tuple[tuple[Interval, ...], ...]
-    final_state: Intervals | None = None
-    residual: Residual | None = None
-    input: tuple[Fraction, ...] | None = None
-    phases: tuple[Phase, ...] = ()
-    instants: tuple[Values, ...] = ()
 
     @property
     def decay(self) -> Fraction:
@@ -142,12 +106,16 @@ class AgentsPart(AgentsAnswer):
         return tuple(found)
 
     @cached_property
+    def begin(self) -> Begin:
+        """Where the agents begin, as the check reads it."""
+        return checked_begin(self.structure, self.protocol, self.matrix, self.initial_state or ())
+
+    @cached_property
     def initial_values(self) -> tuple[Fraction, ...]:
         """``V(0)`` of every function used."""
         if self.initial_state is None:
             return ()
-        scaled = scaled_states(self.initial_state, self.protocol.offsets, 1 / self.protocol.first_gain)
-        return tuple(initial_value(self.structure, V, self.matrix.inverse, scaled) for V in self.functions)
+        return tuple(self.begin.value(checked_function(V)) for V in self.functions)
 
     @property
     def obligations(self) -> list[Obligation]:
@@ -157,6 +125,25 @@ class AgentsPart(AgentsAnswer):
             Obligation("agent-coupling", "agents", {"coupling": self.matrix.coupling}),
             *(Obligation("agent-phase", f"phases[{k}]", {"rate": phase.rate}) for k, phase in enumerate(self.phases)),
         ]
+
+    @property
+    def section(self) -> AgentsSection:
+        """The section ``agents``."""
+        protocol, matrix, residual = self.protocol, self.matrix, self.residual
+        return AgentsSection(
+            order=self.order,
+            plant=protocol.plant,
+            own=protocol.own,
+            gains=protocol.gains,
+            coupling=matrix.coupling,
+            lower_triangle=matrix.W,
+            rate=matrix.rate,
+            gain_cap=protocol.gain_cap,
+            points=matrix.points,
+            functions=[UsedSection(function=one.number, inputs=numbers(one.inputs)) for one in self.used],
+            residual=None if residual is None else ResidualSection(clock=residual.clock, agents=residual.agents),
+            **written(self),
+        )
 
     # ------------------------------------------------------------------ bounds over time
 
@@ -202,8 +189,8 @@ class AgentsPart(AgentsAnswer):
 
     def compare(self, run: AgentsTrajectory) -> AgentsComparison | None:
         """Compare a run with what is proved of it; None where nothing disagrees."""
-        inputs = [one.inputs for one in self.used]
-        return compare_agents(self.structure, self.matrix, self.functions, self.initial_values, inputs, self.input, run)
+        each = self.functions, self.initial_values, self.error_constants
+        return compare_agents(self.structure, self.matrix, *each, self.input, run)
 
     @property
     def rate(self) -> Fraction:
@@ -227,9 +214,7 @@ class AgentsPart(AgentsAnswer):
     @property
     def in_place(self) -> bool:
         """Whether agents begin in agreement, with a common motion: then nothing steers them but to rest."""
-        own = any(self.protocol.own)
-        braked = own and any(chain[1] for agent in self.initial_state or () for chain in agent)
-        return not any(self.initial_values) and not braked
+        return not any(self.initial_values) and not (any(self.protocol.own) and self.begins_moving)
 
     @property
     def bounding_rho2(self) -> Fraction | None:
@@ -251,31 +236,30 @@ class AgentsPart(AgentsAnswer):
         proof += f"{counted(len(self.used), 'Lyapunov function')}, {counted(pieces, 'piece')}"
         return f"{self.gains_text}, coupling {near(matrix.coupling)}", proof
 
-    def __repr__(self) -> str:
-        size = "" if self.input is None else f", {self.norm} <= {up(max(self.input), 4)}"
-        return f"AgentsPart(order {self.order}, R = {float(self.decay):.6g}{size})"
+    @property
+    def _summary(self) -> str:
+        return f"order {self.order}, R = {float(self.decay):.6g}"
 
 
 def prove_agents(
-    structure: Structure,
+    proof: GraphProof,
     base: Protocol,
     agents: Agents,
-    functions: Sequence[LyapunovFunction],
-    influence: Influence,
     offsets: Sequence[Sequence[Fraction]],
     initial_state: States | None,
-) -> AgentsPart:
+) -> AgentsAnswer:
     """Design the gains of agents of order n for proved Lyapunov functions of their graph, and prove what they do.
+
+    Of the cascade, which has no gains to design, see :func:`~ptcc_certify.certificate.cascade_part.prove_cascade`.
 
     Parameters
     ----------
-    structure : Structure
+    proof : GraphProof
+        Of the graph; of its functions the one that makes inputs smallest decides the coupling, faster ones are used
+        besides.
     base : Protocol
         Gain, clock and deadline.
     agents : Agents
-    functions : sequence of LyapunovFunction
-        Proved; the one that makes inputs smallest decides the coupling, and faster ones are used besides.
-    influence : Influence
     offsets : N rows of d Fraction
     initial_state : N tuples of d tuples of n Fraction, or None
 
@@ -284,7 +268,9 @@ def prove_agents(
     NoCertificate
         No matrix for one agent was found.
     """
-    gain = base.gain
+    if agents.cascade is not None:
+        return prove_cascade(proof, base, agents, offsets, initial_state)
+    structure, functions, gain = proof.structure, proof.functions, base.gain
     proved = [V.proved_rate for V in functions]
     best = max((rate for rate in proved if rate > 0), default=None)
     scaled = ScaledAgent(agents.coefficients, agents.own, gain.rho1, gain.pole, gain.first, agents.cap)
@@ -303,22 +289,16 @@ def prove_agents(
             slower = round_and_prove(scaled, found, rate, _coupling(chosen))
             matrix = matrix if slower is None else slower
     used = [k for k, rate in enumerate(proved) if rate > 0 and matrix.coupling * rate >= 1]
-    protocol = AgentsProtocol(
-        base, agents.coefficients, agents.own, matrix.gains, tuple(map(tuple, offsets)), agents.cap
-    )
-    constants = [error_constants(structure, functions[k]) if functions[k].matrix is not None else None for k in used]
     part = AgentsPart(
-        structure,
-        protocol,
-        matrix,
-        tuple(map(UsedFunction, used, constants)),
-        tuple(functions[k] for k in used),
-        initial_state,
-        common_motion(agents.coefficients, agents.own, gain),
+        protocol=AgentsProtocol(base, agents.coefficients, agents.own, matrix.gains, rows_of(offsets), agents.cap),
+        matrix=matrix,
+        initial_state=initial_state,
+        motion=common_motion(agents.coefficients, agents.own, gain),
+        **use(structure, functions, used),
     )
     decided = initial_state is not None and bool(used or not structure.graph.n_edges)
-    final = final_states(part, influence) if decided else None
-    return replace(part, final_state=final, residual=_residual(part), input=_input(part, influence))
+    final = final_states(part, proof.influence) if decided else None
+    return replace(part, final_state=final, residual=_residual(part), input=_input(part, proof.influence))
 
 
 def with_phases(part: AgentsPart) -> AgentsPart:
@@ -341,8 +321,7 @@ def with_instants(part: AgentsPart) -> AgentsPart:
     """Add what functions are worth at instants nearer to the deadline."""
     if part.order < 2 or part.initial_state is None or not any(part.initial_values):
         return part
-    values = instant_values(part.structure, part.protocol, part.matrix, part.functions, part.initial_state)
-    return replace(part, instants=values)
+    return replace(part, instants=instant_values(part.begin, part.functions))
 
 
 def _coupling(rate: Fraction) -> Fraction:
@@ -370,24 +349,20 @@ def _residual(part: AgentsPart) -> Residual | None:
 
 def _input(part: AgentsPart, influence: Influence) -> tuple[Fraction, ...] | None:
     """Return bounds of the whole input; None where none is proved."""
-    n, cap, base = part.order, part.protocol.gain_cap, part.protocol.base
+    n, cap = part.order, part.protocol.gain_cap
     if part.initial_state is None or part.unbounded or not part.functions:
         return None
     eta = part.protocol.first_gain if part.decay >= 2 * n or cap is None else cap
-    pairs = [
-        (one.inputs if V.matrix is not None else error_constants(part.structure, V), value)
-        for one, V, value in zip(part.used, part.functions, part.initial_values, strict=True)
-    ]
+    pairs = list(zip(part.error_constants, part.initial_values, strict=True))
     damped = _damping(part, influence)
     if damped is None or all(constants is None for constants, _ in pairs):
         return None
     gain = part.matrix.gains[-1] * part.matrix.coupling  # c^2 b'P b
-    extra = base.reaching.mu1 * part.dimension if base.reaching is not None else Fraction(0)
     bounds = []
     for k, h in enumerate(part.protocol.offsets):
         square = min(constants[k] * value for constants, value in pairs if constants is not None)
         own = abs(part.protocol.plant[0]) * sum(map(abs, h)) + damped[k]
-        bounds.append(round_up(eta**n * root_product(gain, square) + own + extra))
+        bounds.append(round_up(eta**n * root_product(gain, square) + own + part.sliding_terms))
     return tuple(bounds)
 
 
@@ -409,55 +384,26 @@ def _damping(part: AgentsPart, influence: Influence) -> list[Fraction] | None:
     return bounds
 
 
-def matrix_section(part: AgentsPart) -> AgentsSection:
-    """Return the section ``agents`` of agents of order n."""
-    protocol, matrix, residual = part.protocol, part.matrix, part.residual
-    return AgentsSection(
-        order=part.order,
-        dimension=part.dimension,
-        plant=protocol.plant,
-        own=protocol.own,
-        gains=protocol.gains,
-        coupling=matrix.coupling,
-        lower_triangle=matrix.W,
-        rate=matrix.rate,
-        gain_cap=protocol.gain_cap,
-        points=matrix.points,
-        functions=[UsedSection(function=one.number, inputs=numbers(one.inputs)) for one in part.used],
-        offsets=protocol.offsets,
-        initial_state=part.initial_state,
-        motion=part.motion,
-        final_state=part.final_state,
-        residual=None if residual is None else ResidualSection(clock=residual.clock, agents=residual.agents),
-        input=inputs_section(part.input),
-    )
-
-
-def phases_section(part: AgentsAnswer) -> list[PhaseSection]:
-    """Return the section ``phases``; empty without phases."""
-    return [
-        PhaseSection(function=p.function, rate=p.rate, coupling=p.coupling, lower_triangle=p.W, points=p.points)
-        for p in getattr(part, "phases", ())
-    ]
-
-
-def read_matrix(
-    section: AgentsSection, structure: Structure, base: Protocol, functions: Sequence[LyapunovFunction]
-) -> AgentsPart:
-    """Return what an accepted certificate says of agents of order n, without phases."""
+def read_agents(
+    report: CheckReport, structure: Structure, base: Protocol, functions: Sequence[LyapunovFunction]
+) -> AgentsAnswer | None:
+    """Return what an accepted certificate says of agents; None if it says nothing."""
+    section: AgentsSection | CascadeSection | None = report.sections.get("agents")
+    if section is None:
+        return None
+    instants = rows_of(report.sections.get("instants", ()))
+    if isinstance(section, CascadeSection):
+        return replace(read_cascade(section, structure, base, functions), instants=instants)
     plant, own, gains, points = map(tuple, (section.plant, section.own, section.gains, section.points))
-    matrix = AgentMatrix(rows_of(section.lower_triangle), section.rate, points, section.coupling, gains)
-    protocol = AgentsProtocol(base, plant, own, gains, rows_of(section.offsets), section.gain_cap)
-    used, residual = used_of(section.functions), section.residual
+    residual = section.residual
     return AgentsPart(
-        structure,
-        protocol,
-        matrix,
-        used,
-        tuple(functions[one.number] for one in used),
-        states_of(section.initial_state),
-        rows_of(section.motion),
-        states_of(section.final_state),
-        None if residual is None else Residual(residual.clock, rows_of(residual.agents)),
-        bounds_of(section.input),
+        protocol=AgentsProtocol(base, plant, own, gains, rows_of(section.offsets), section.gain_cap),
+        matrix=AgentMatrix(rows_of(section.lower_triangle), section.rate, points, section.coupling, gains),
+        residual=None if residual is None else Residual(residual.clock, rows_of(residual.agents)),
+        phases=tuple(
+            Phase(p.function, rows_of(p.lower_triangle), p.rate, p.coupling, tuple(p.points))
+            for p in report.sections.get("phases", ())
+        ),
+        instants=instants,
+        **read(section, structure, functions),
     )

@@ -5,40 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, float_down, float_up, near, up
-from ptcc_certify.bounds.agents.cascade import (
-    Roots,
-    course,
-    drive_integral,
-    initial_rows,
-    input_from,
-    input_is_bounded,
-    root_of,
-)
+from ptcc_certify.bounds.agents.cascade import Roots, course, drive_integral, input_from, roots_of
 from ptcc_certify.bounds.agents.comparison import AgentsComparison, compare_with_bounds
-from ptcc_certify.bounds.agents.each_agent import States, error_constants, root_product
+from ptcc_certify.bounds.agents.each_agent import States, root_product
 from ptcc_certify.bounds.agents.instants import Values, instant_roots
-from ptcc_certify.bounds.agents.motion import LARGEST_DECAY, Interval, common_motion
-from ptcc_certify.bounds.final_state.of_graph import Influence
+from ptcc_certify.bounds.agents.motion import LARGEST_DECAY, common_motion
 from ptcc_certify.bounds.float_conversion import numbers
-from ptcc_certify.certificate.agents_answer import (
-    AgentsAnswer,
-    Intervals,
-    Residual,
-    UsedFunction,
-    bounds_of,
-    final_states,
-    inputs_section,
-    rows_of,
-    states_of,
-    used_of,
-)
-from ptcc_certify.checker.agent_cascade import CascadeSection, TrackedSection
+from ptcc_certify.certificate.agents_answer import AgentsAnswer, final_states, read, rows_of, use, written
+from ptcc_certify.certificate.graph_proof import GraphProof
+from ptcc_certify.checker.agent_cascade import CascadeSection, TrackedSection, input_is_bounded
 from ptcc_certify.errors import Change, ParameterError, Sentence
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
@@ -49,42 +28,23 @@ from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.theorems.theorem import Obligation
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class CascadePart(AgentsAnswer):
-    """What is proved of double integrators of the cascade.
+    """What is proved of double integrators of the cascade; see :class:`AgentsAnswer`.
+
+    All functions that decay are used. Final states are of positions alone where velocities are not proved to vanish.
 
     Attributes
     ----------
-    structure : Structure
     protocol : CascadeProtocol
-    used : tuple of UsedFunction
-    functions : tuple of LyapunovFunction
-        Those that are used: all that decay.
     roots : tuple of Roots
         Of every function used; empty without an initial state.
-    initial_state : N tuples of d tuples of 2 Fraction, or None
-        Position and velocity of every agent in every coordinate.
-    motion : 2 by 2 intervals
-        ``M``: the common motion from 0 to ``T``.
-    final_state : like initial_state, with intervals, or None
-        Positions alone where velocities are not proved to vanish.
-    input : tuple of N Fraction, or None
-        Bounds of the Euclidean norm of every agent's input.
     instants : tuple of tuples of Fraction or None
-        Bounds of ``sqrt(V)`` of positions and of ``r``, of each function used, at ``1 - t/T = 1/2, 1/4, ..``.
+        Bounds of ``sqrt(V)`` of positions and of ``r``, of each function used.
     """
 
-    structure: Structure
     protocol: CascadeProtocol
-    used: tuple[UsedFunction, ...]
-    functions: tuple[LyapunovFunction, ...]
     roots: tuple[Roots, ...]
-    initial_state: States | None
-    motion: tuple[tuple[Interval, ...], ...]
-    final_state: Intervals | None = None
-    input: tuple[Fraction, ...] | None = None
-    residual: Residual | None = None
-    instants: tuple[Values, ...] = ()
 
     @property
     def settles(self) -> bool:
@@ -150,8 +110,7 @@ class CascadePart(AgentsAnswer):
     @property
     def in_place(self) -> bool:
         """Whether agents begin in agreement, at rest."""
-        moving = any(chain[1] for agent in self.initial_state or () for chain in agent)
-        return not moving and not any(x for root in self.roots for x in root)
+        return not self.begins_moving and not any(x for root in self.roots for x in root)
 
     @property
     def gains_text(self) -> str:
@@ -173,6 +132,16 @@ class CascadePart(AgentsAnswer):
     def obligations(self) -> list[Obligation]:
         """What proves the decay: obligations with numbers or a witness."""
         return [Obligation("agent-cascade", "agents", {"alpha": self.alpha})]
+
+    @property
+    def section(self) -> CascadeSection:
+        """The section ``agents``."""
+        roots: list[tuple[Fraction | None, Fraction | None]] = [(root.state, root.drive) for root in self.roots]
+        functions = [
+            TrackedSection(function=one.number, inputs=numbers(one.inputs), initial=initial, drive=drive)
+            for one, (initial, drive) in zip(self.used, roots or [(None, None)] * len(self.used), strict=True)
+        ]
+        return CascadeSection(cascade=self.alpha, functions=functions, **written(self))
 
     # ------------------------------------------------------------------ bounds over time
 
@@ -227,12 +196,6 @@ class CascadePart(AgentsAnswer):
                 state[late], speed[late] = own.state, own.combined + own.pull * own.state
         return state, speed
 
-    @cached_property
-    def error_constants(self) -> tuple[tuple[Fraction, ...] | None, ...]:
-        """``c_k^E`` of every function used."""
-        pairs = zip(self.used, self.functions, strict=True)
-        return tuple(one.inputs if V.matrix is not None else error_constants(self.structure, V) for one, V in pairs)
-
     def deviation_bound(self, remaining: np.ndarray) -> np.ndarray:
         """Return (N, 2, M) bounds of the deviation of positions and velocities from the common motion.
 
@@ -273,17 +236,15 @@ class CascadePart(AgentsAnswer):
             self.structure, self.functions, self._least_values, self.deviation_bound, self.input, run
         )
 
-    def __repr__(self) -> str:
-        size = "" if self.input is None else f", {self.norm} <= {up(max(self.input), 4)}"
-        return f"CascadePart(alpha = {near(self.alpha)}{size})"
+    @property
+    def _summary(self) -> str:
+        return f"alpha = {near(self.alpha)}"
 
 
 def prove_cascade(
-    structure: Structure,
+    proof: GraphProof,
     base: Protocol,
     agents: Agents,
-    functions: Sequence[LyapunovFunction],
-    influence: Influence,
     offsets: Sequence[Sequence[Fraction]],
     initial_state: States | None,
 ) -> CascadePart:
@@ -291,13 +252,12 @@ def prove_cascade(
 
     Parameters
     ----------
-    structure : Structure
+    proof : GraphProof
+        Of the graph; its Lyapunov functions are used.
     base : Protocol
         Gain, clock and deadline.
     agents : Agents
         With ``cascade``.
-    functions : sequence of LyapunovFunction
-    influence : Influence
     offsets : N rows of d Fraction
     initial_state : N tuples of d tuples of 2 Fraction, or None
 
@@ -313,102 +273,47 @@ def prove_cascade(
             f"= {near(agents.alpha)} is too large to enclose the common motion: beyond "
             f"{LARGEST_DECAY}/(rho1 T); take at most {down(LARGEST_DECAY / falls, 4)}",
         )
-    numbers = [k for k, V in enumerate(functions) if V.proved_rate > 0]
-    used = tuple(functions[k] for k in numbers)
-    full = [error_constants(structure, V) if V.matrix is not None else None for V in used]
+    fields = use(proof.structure, proof.functions, [k for k, V in enumerate(proof.functions) if V.proved_rate > 0])
     protocol = CascadeProtocol.of(base, agents.alpha, offsets)
     roots: tuple[Roots, ...] = ()
     if initial_state is not None:
-        rows = initial_rows(structure, initial_state, offsets, base.gain, agents.alpha)
-        roots = tuple(Roots(*(root_of(structure, V, each) for each in rows)) for V in used)
-    part = CascadePart(
-        structure,
-        protocol,
-        tuple(map(UsedFunction, numbers, full)),
-        used,
-        roots,
-        initial_state,
-        common_motion(agents.coefficients, agents.own, base.gain),
-    )
+        roots = roots_of(proof.structure, protocol, fields["functions"], initial_state)
+    motion = common_motion(agents.coefficients, agents.own, base.gain)
+    part = CascadePart(protocol=protocol, roots=roots, initial_state=initial_state, motion=motion, **fields)
     final = None
     if initial_state is not None and part.settles:
-        final = final_states(part, influence)
+        final = final_states(part, proof.influence)
         if final is not None and not part.derivatives_agree:
             final = tuple(tuple(chain[:1] for chain in agent) for agent in final)
-    begins = initial_state is not None and any(root.state or root.drive for root in roots)
-    instants = instant_roots(structure, protocol, used, initial_state) if initial_state and begins else ()
+    instants: tuple[Values, ...] = ()
+    if initial_state is not None and any(root.state or root.drive for root in roots):
+        instants = instant_roots(proof.structure, protocol, part.functions, initial_state)
     return replace(part, final_state=final, input=_input(part), instants=instants)
 
 
 def _input(part: CascadePart) -> tuple[Fraction, ...] | None:
     """Return the least bounds of the whole input, agent by agent; None where none is proved."""
-    gain, base, begin = part.protocol.gain, part.protocol.base, part.initial_state
+    gain, begin = part.protocol.gain, part.initial_state
     if begin is None:
         return None
     speeds = [root_product(sum((chain[1] ** 2 for chain in agent), Fraction(0))) for agent in begin]
     bounds = [
-        input_from(
-            gain,
-            part.alpha,
-            V.proved_rate,
-            constants,
-            root.state,
-            root.combined or Fraction(0),
-            speeds,
-        )
+        input_from(gain, part.alpha, V.proved_rate, constants, root.state, root.combined or Fraction(0), speeds)
         for V, constants, root in zip(part.functions, part.error_constants, part.roots, strict=True)
         if constants is not None and input_is_bounded(gain.pole, V.proved_rate, part.alpha)
     ]
     if not bounds:
         return None
-    extra = base.reaching.mu1 * part.dimension if base.reaching is not None else Fraction(0)
-    return tuple(min(each) + extra for each in zip(*bounds, strict=True))
-
-
-def cascade_section(part: CascadePart) -> CascadeSection:
-    """Return the section ``agents`` of the cascade."""
-    roots: Sequence[Any] = part.roots if part.initial_state is not None else [None] * len(part.used)
-    pairs = zip(part.used, roots, strict=True)
-    return CascadeSection(
-        cascade=part.alpha,
-        dimension=part.dimension,
-        functions=[
-            TrackedSection(
-                function=one.number,
-                inputs=numbers(one.inputs),
-                initial=None if root is None else root.state,
-                drive=None if root is None else root.drive,
-            )
-            for one, root in pairs
-        ],
-        offsets=part.protocol.offsets,
-        initial_state=part.initial_state,
-        motion=part.motion,
-        final_state=part.final_state,
-        input=inputs_section(part.input),
-    )
+    return tuple(min(each) + part.sliding_terms for each in zip(*bounds, strict=True))
 
 
 def read_cascade(
     section: CascadeSection, structure: Structure, base: Protocol, functions: Sequence[LyapunovFunction]
 ) -> CascadePart:
     """Return what an accepted certificate says of the cascade."""
-    alpha = section.cascade
-    offsets, begin = rows_of(section.offsets), states_of(section.initial_state)
-    used, roots = [functions[use.function] for use in section.functions], list[Roots]()
-    if begin is not None:
-        rows = initial_rows(structure, begin, offsets, base.gain, alpha)[2:]
-        for use, V in zip(section.functions, used, strict=True):
-            constants = use.initial or Fraction(0), use.drive or Fraction(0)
-            roots.append(Roots(*constants, *(root_of(structure, V, x) for x in rows)))
-    return CascadePart(
-        structure,
-        CascadeProtocol.of(base, alpha, offsets),
-        used_of(section.functions),
-        tuple(used),
-        tuple(roots),
-        begin,
-        rows_of(section.motion),
-        states_of(section.final_state),
-        bounds_of(section.input),
-    )
+    fields, roots = read(section, structure, functions), tuple[Roots, ...]()
+    protocol = CascadeProtocol.of(base, section.cascade, rows_of(section.offsets))
+    if (begin := fields["initial_state"]) is not None:
+        pairs = zip(section.functions, roots_of(structure, protocol, fields["functions"], begin), strict=True)
+        roots = tuple(Roots(one.initial or Fraction(0), one.drive or Fraction(0), *root[2:]) for one, root in pairs)
+    return CascadePart(protocol=protocol, roots=roots, **fields)

@@ -11,9 +11,6 @@ from lmi.exact.elementary_enclosures import rounded
 from ptcc_certify.bounds.delay.late_messages import late_obligations, messages_section
 from ptcc_certify.bounds.input.effort import EnergyIntegral, Peak, effort_section, peak_witness
 from ptcc_certify.bounds.tracking import leaders_section, tracking_obligations
-from ptcc_certify.certificate.agents_answer import AgentsAnswer
-from ptcc_certify.certificate.agents_part import AgentsPart, matrix_section, phases_section
-from ptcc_certify.certificate.cascade_part import CascadePart, cascade_section
 from ptcc_certify.certificate.checking import record
 from ptcc_certify.certificate.claim_sections import ball, claim_section, claim_steps
 from ptcc_certify.certificate.constrained_switching.claims import Claim
@@ -43,10 +40,8 @@ from ptcc_certify.certificate.proof import Proof
 from ptcc_certify.certificate.section_writer import Writer, write
 from ptcc_certify.certificate.unverified import write_unverified
 from ptcc_certify.checker import NOT_OF_FAMILIES, SCHEMA, SLIDING_BOUND, SLIDING_CLOCK
-from ptcc_certify.checker.agent_cascade import CascadeSection
 from ptcc_certify.checker.agent_decrease import PhaseSection
 from ptcc_certify.checker.agent_instants import InstantsSection
-from ptcc_certify.checker.agents import AgentsSection
 from ptcc_certify.checker.constrained_switching import Section
 from ptcc_certify.checker.family_bounds import FamilyInput
 from ptcc_certify.checker.family_limits import EQUAL
@@ -117,13 +112,16 @@ def _graph_sections(proof: GraphProof, met: str | None, out: Writer) -> tuple[di
         "input": write(InputSection | None, effort_section(proof.effort, proof.graph.n_nodes), out),
     }
     more: dict[str, Any] = {}
-    if proof.agents is not None:
-        section = agents_section(proof.agents)
-        more["agents"] = write(type(section), section, out)
-        if phases := phases_section(proof.agents):
+    if (agents := proof.agents) is not None:
+        more["agents"] = write(type(agents.section), agents.section, out)
+        if agents.phases:
+            phases = [
+                PhaseSection(function=p.function, rate=p.rate, coupling=p.coupling, lower_triangle=p.W, points=p.points)
+                for p in agents.phases
+            ]
             more["phases"] = write(Several[PhaseSection], phases, out)
-        if instants := getattr(proof.agents, "instants", ()):
-            more["instants"] = write(InstantsSection, instants, out)
+        if agents.instants:
+            more["instants"] = write(InstantsSection, agents.instants, out)
     if proof.offsets is not None:
         more["formation"] = write(FormationSection, formation_section(proof, proof.offsets, final), out)
     return sections, more
@@ -154,14 +152,6 @@ def _family_sections(proof: FamilyProof, out: Writer) -> tuple[dict[str, Any], d
         claims = [_claim(proof, claim) for claim in proof.restricted]
         more["restricted"] = [write(type(claim), claim, out) for claim in claims]
     return sections, more
-
-
-def agents_section(part: AgentsAnswer) -> AgentsSection | CascadeSection:
-    """Return the section ``agents``."""
-    if isinstance(part, CascadePart):
-        return cascade_section(part)
-    assert isinstance(part, AgentsPart)
-    return matrix_section(part)
 
 
 def _sections_beside(proof: Proof, out: Writer) -> dict[str, Any]:

@@ -35,7 +35,6 @@ from ptcc_certify.certificate.agents_part import AgentsPart, prove_agents, with_
 from ptcc_certify.certificate.agents_request import (
     Chains,
 )
-from ptcc_certify.certificate.cascade_part import prove_cascade
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.evidence import Observations
 from ptcc_certify.certificate.exit_code import rejects
@@ -93,18 +92,8 @@ SETTLED = 1e-6
 
 def with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: bool) -> Certificate:
     """Return the certificate of a graph as one of agents of order n on it."""
-    functions = certificate.graph_proof.functions
     try:
-        prove = prove_agents if agents.cascade is None else prove_cascade
-        proof = prove(
-            certificate.graph_proof.structure,
-            certificate.protocol,
-            agents,
-            functions,
-            certificate.graph_proof.influence,
-            chains.offsets,
-            chains.states,
-        )
+        proof = prove_agents(certificate.graph_proof, certificate.protocol, agents, chains.offsets, chains.states)
     except NoCertificate as error:
         raise ParameterError("agents", f"{error}; ask for a smaller decay or a lower order") from None
     proof = with_instants(with_phases(proof)) if isinstance(proof, AgentsPart) else proof

@@ -11,9 +11,7 @@ from ptcc_certify.bounds.delay.late_messages import read_late
 from ptcc_certify.bounds.float_conversion import fractions
 from ptcc_certify.bounds.input.effort import read_effort
 from ptcc_certify.bounds.tracking import read_tracking
-from ptcc_certify.certificate.agents_answer import AgentsAnswer, rows_of
-from ptcc_certify.certificate.agents_part import read_matrix
-from ptcc_certify.certificate.cascade_part import read_cascade
+from ptcc_certify.certificate.agents_part import read_agents
 from ptcc_certify.certificate.claim_sections import read_claim
 from ptcc_certify.certificate.evidence import Observations
 from ptcc_certify.certificate.family_proof import ComponentProof, FamilyProof
@@ -31,9 +29,6 @@ from ptcc_certify.certificate.unverified import (
     read_unproved,
     read_upper_bound,
 )
-from ptcc_certify.checker import CheckReport
-from ptcc_certify.checker.agent_cascade import CascadeSection
-from ptcc_certify.checker.agents import AgentsSection
 from ptcc_certify.checker.attracting_boxes import AttractingBox, KeptBox
 from ptcc_certify.checker.protocol import NominalSection, ReachingTimes, SlidingSection
 from ptcc_certify.checker.side_files import SideFiles
@@ -41,11 +36,9 @@ from ptcc_certify.checker.theorem_function import PaperSection
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound
-from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.model import Protocol
 from ptcc_certify.model.reaching_time import ReachingTime
-from ptcc_certify.theorems.agent_decrease import Phase
 from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
 from ptcc_certify.theorems.theorem import ExactInterval, Obligation, RateProof
 
@@ -153,23 +146,6 @@ def _read_bounds(stated: Any, components: Sequence[FamilyComponent]) -> list[Fam
         None if entry is None or component.kernel is None else read_upper_bound(Quotient.of(component), entry)
         for entry, component in zip(entries, components, strict=True)
     ]
-
-
-def read_agents(
-    report: CheckReport, structure: Structure, base: Protocol, functions: Sequence[LyapunovFunction]
-) -> AgentsAnswer | None:
-    """Return what an accepted certificate says of agents, with its phases; None if it says nothing."""
-    section: AgentsSection | CascadeSection | None = report.sections.get("agents")
-    if section is None:
-        return None
-    instants = rows_of(report.sections.get("instants", ()))
-    if isinstance(section, CascadeSection):
-        return replace(read_cascade(section, structure, base, functions), instants=instants)
-    phases = tuple(
-        Phase(p.function, rows_of(p.lower_triangle), p.rate, p.coupling, tuple(p.points))
-        for p in report.sections.get("phases", ())
-    )
-    return replace(read_matrix(section, structure, base, functions), phases=phases, instants=instants)
 
 
 def read_protocol(section: NominalSection | SlidingSection) -> Protocol:

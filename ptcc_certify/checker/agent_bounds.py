@@ -122,30 +122,42 @@ class Begin:
     def inverse(self) -> tuple[Matrix, Fraction]:
         """``P = W^-1`` in integers, times a positive number, and that."""
         W, scale = self.agents.scaled_W
-        adjugate, determinant = _adjugate(W)
-        return adjugate, Fraction(determinant, scale)
+        rows, determinant = adjugate(W)
+        return rows, Fraction(determinant, scale)
 
     def value(self, function: Function, at: tuple[list[list[list[int]]], Fraction] | None = None) -> Fraction:
         """Bound ``V = sum_kl Om_kl z_k'P z_l``, summed over the coordinates of space, from above, to many bits.
 
         At time 0, or of other columns over a scale.
         """
-        n = self.agents.n
-        P, times = self.inverse
         columns, scale = at or self.columns
-        form = Weights.of(function)
-        total, unit = 0, 1
-        for each in columns:
-            Z: list[list[int]] = []
-            for x in each:
-                z, unit = form.coordinates(self.graph, x)
-                Z.append(z)
-            U = [form.times(z) for z in Z]
-            bits = longest(chain.from_iterable(Z)), longest(chain.from_iterable(U))
-            spend(n**2 * len(Z[0]), *bits, "initial values")
-            spend(n**2, sum(bits), longest(chain.from_iterable(P)), "initial values")
-            total += sum(P[i][j] * sum(map(mul, Z[i], U[j])) for i in range(n) for j in range(n))
-        return rounded(Fraction(total, form.scale * (scale * unit) ** 2) / times, BITS, up=True)
+        return value_of(self.graph, function, columns, scale, self.inverse)
+
+
+def value_of(
+    graph: Digraph,
+    function: Function,
+    columns: Sequence[Sequence[Sequence[int]]],
+    scale: int | Fraction,
+    inverse: tuple[Matrix, Fraction] = ([[1]], Fraction(1)),
+) -> Fraction:
+    """Bound ``V = sum_kl Om_kl z_k'P z_l`` from above, to many bits, summed over the coordinates of space.
+
+    Of columns over a scale, by coordinate and derivative; ``P`` is told in integers, times a positive number, and that.
+    """
+    (P, times), form = inverse, Weights.of(function)
+    n, total, unit = len(P), 0, 1
+    for each in columns:
+        Z: list[list[int]] = []
+        for x in each:
+            z, unit = form.coordinates(graph, x)
+            Z.append(z)
+        U = [form.times(z) for z in Z]
+        bits = longest(chain.from_iterable(Z)), longest(chain.from_iterable(U))
+        spend(n**2 * len(Z[0]), *bits, "initial values")
+        spend(n**2, sum(bits), longest(chain.from_iterable(P)), "initial values")
+        total += sum(P[i][j] * sum(map(mul, Z[i], U[j])) for i in range(n) for j in range(n))
+    return rounded(Fraction(total, form.scale * (scale * unit) ** 2) / times, BITS, up=True)
 
 
 @dataclass(frozen=True)
@@ -203,7 +215,7 @@ class Weights:
         return [sum(map(mul, row, z)) for row in self.matrix]
 
 
-def _adjugate(W: Matrix) -> tuple[Matrix, int]:
+def adjugate(W: Matrix) -> tuple[Matrix, int]:
     """Return ``det(W) W^-1`` and ``det(W)`` of a positive definite integer matrix, by elimination without fractions."""
     n, before = len(W), 1
     bits = n * longest(chain.from_iterable(W))

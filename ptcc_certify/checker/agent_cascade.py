@@ -6,23 +6,22 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import chain
-from operator import mul
 from typing import NamedTuple
 
 from lmi.exact.decimal_rounding import down, up
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.numbers import integers, longest, shorten, sized
 from lmi.exact.work import spend
-from ptcc_certify.checker.agent_bounds import BITS, AgentsInput, Used, UsedSection, Weights, verify_used
-from ptcc_certify.checker.agent_instants import MANY_INSTANTS, Halved, halvings, largest_value
+from ptcc_certify.checker.agent_bounds import BITS, AgentsInput, Used, UsedSection, value_of, verify_used
+from ptcc_certify.checker.agent_instants import Halved, check_instants, halvings, largest_value
 from ptcc_certify.checker.agent_model import LARGEST_DIMENSION, LONGEST, Cascade, within
-from ptcc_certify.checker.agent_motion import States, check_final_states, check_motion, need_shape, sized_offsets
+from ptcc_certify.checker.agent_motion import States, check_ends, need_shape, sized_offsets
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import RejectedError, length, need
+from ptcc_certify.checker.reading import length, need
 from ptcc_certify.checker.sections import Ball, ByAgent, Positive, Several
 
 
@@ -56,14 +55,7 @@ class Vectors(NamedTuple):
 
     def value(self, graph: Digraph, function: Function) -> Fraction:
         """Bound ``V``, summed over the coordinates of space, from above, to many bits."""
-        form = Weights.of(function)
-        total, unit = 0, 1
-        for x in self.columns:
-            z, unit = form.coordinates(graph, x)
-            u = form.times(z)
-            spend(len(z), longest(z), longest(u), "initial values")
-            total += sum(map(mul, z, u))
-        return rounded(Fraction(total, form.scale * (self.scale * unit) ** 2), BITS, up=True)
+        return value_of(graph, function, [[x] for x in self.columns], self.scale)
 
 
 class Drive(NamedTuple):
@@ -73,9 +65,9 @@ class Drive(NamedTuple):
     error: Vectors
     velocities: Vectors
 
-    def combined(self, agents: Cascade, theta: Fraction) -> Vectors:
+    def combined(self, agents: Cascade) -> Vectors:
         """Return ``r(0) = v(0)/eta(0) + (alpha + theta) x(0)``."""
-        (p, q), (a, c) = agents.eta_0.as_integer_ratio(), (agents.own[1] + theta).as_integer_ratio()
+        (p, q), (a, c) = agents.eta_0.as_integer_ratio(), agents.pull(Fraction(1)).as_integer_ratio()
         X, V = self.positions, self.velocities
         numbers = list(chain.from_iterable(chain(X.columns, V.columns)))
         sized(len(numbers), longest(numbers) + longest((p, q)) + longest((a, c)), "the input")
@@ -103,17 +95,10 @@ def check_cascade(doc: Document, verified: Verified) -> bool:
     agents = Cascade(2, d, (Fraction(0),) * 2, (Fraction(0), alpha), None, gain)
     offsets, states = sized_offsets(section.offsets, agents), section.initial_state
     need_shape(states, "initial_state", agents)
-    drive = None if states is None else _drive(graph, agents, states, offsets)
+    drive = None if states is None else drive_of(graph, agents, states, offsets)
     used = _functions(doc, verified, section, drive)
-    doc.at = "agents.motion"
-    M = check_motion(doc, agents, section.motion)
-    doc.at = "agents.final_state"
-    moves = bool(graph.listening)
-    proved = doc.sections["influence"] is not None and (bool(used) or not moves)
-    if section.final_state is not None:
-        need(proved and states is not None, "a final state without initial states or a proof")
-        rests = not moves or any(one.use.function.rate * gain.k > 2 for one in used)
-        check_final_states(doc, agents, verified.final, M[: 1 + rests], states or (), offsets, section.final_state)
+    rests = not graph.listening or any(one.use.function.rate * gain.k > 2 for one in used)
+    proved = check_ends(doc, agents, verified.final, section, bool(used), 1 + rests)
     doc.at = "agents.input"
     if section.input is not None:
         need(drive is not None, "a bound of the input without initial states")
@@ -121,11 +106,15 @@ def check_cascade(doc: Document, verified: Verified) -> bool:
             _check_input(doc, verified, agents, used, drive, section.input)
     if "instants" in doc.data:
         need(states is not None, "instants without initial states")
-        _check_instants(doc, graph, agents, used, halvings_of(graph, agents, states or (), offsets))
+
+        def least(k: int, at: Halved, remaining: Fraction) -> tuple[Fraction, Fraction]:
+            return roots_above(graph, agents, used[k].use.function, at, remaining)
+
+        check_instants(doc, halvings_of(graph, agents, states or (), offsets), len(used), 2, least)
     return proved
 
 
-def _drive(graph: Digraph, agents: Cascade, states: States, offsets: Sequence[Sequence[Fraction]]) -> Drive:
+def drive_of(graph: Digraph, agents: Cascade, states: States, offsets: Sequence[Sequence[Fraction]]) -> Drive:
     """Return what the motion begins with, in integers."""
     longest_state = length(x for part in (*states, offsets) for row in part for x in row)
     spend(40 * agents.d * graph.n, longest_state, longest_state, "the initial states")
@@ -164,20 +153,41 @@ def _functions(doc: Document, verified: Verified, section: CascadeSection, drive
     return used
 
 
+def input_is_bounded(k: Fraction, rate: Fraction, alpha: Fraction) -> bool:
+    """Tell whether the input is proved not to grow without limit: ``b k >= 2``, ``alpha k >= 1``.
+
+    Not with both as equations: then its bound grows like ``s``.
+
+    Examples
+    --------
+    >>> [input_is_bounded(Fraction(1), Fraction(r), Fraction(a)) for r, a in ((4, 1), (5, 1), (4, 2), (3, 9))]
+    [False, True, True, False]
+    """
+    return rate * k >= 4 and alpha * k >= 1 and rate * k + alpha * k > 5
+
+
+def input_size(agents: Cascade, rate: Fraction, state: Fraction, combined: Fraction) -> Fraction:
+    """Return what, times ``sqrt(c_k)``, bounds an input but for ``alpha eta(0) |v_k|``, to many bits from above.
+
+    From ``sqrt(V)`` of the initial positions and of ``r(0)``, of a function by which the input is bounded.
+    """
+    k, alpha, eta = agents.gain.k, agents.own[1], agents.eta_0
+    a, b, theta = alpha - 1 / k, rate / 2 - 2 / k, agents.pull(Fraction(1)) - alpha
+    most = max(Fraction(1), (a + alpha) / (a + b))
+    return rounded(eta**2 * (combined + (1 / k - theta) * state) * most, BITS, up=True)
+
+
 def _check_input(
     doc: Document, verified: Verified, agents: Cascade, used: Sequence[Tracked], drive: Drive, section: AgentsInput
 ) -> None:
     """Verify the bound of every agent's input, in Euclidean norm over space."""
-    graph, k, alpha, eta = verified.structure.graph, agents.gain.k, agents.own[1], agents.eta_0
-    theta = (1 - agents.gain.rho1 / eta) ** 2 / k
-    combined = drive.combined(agents, theta)
+    graph, alpha, eta = verified.structure.graph, agents.own[1], agents.eta_0
+    combined = drive.combined(agents)
     bounds = list[list[Fraction]]()
     for one in used:
         rate, constants = one.use.function.rate, one.use.error_constants(graph)
-        if constants is not None and rate * k >= 4 and alpha * k >= 1 and rate * k + alpha * k > 5:
-            a, b = alpha - 1 / k, rate / 2 - 2 / k
-            root = root_above(combined.value(graph, one.use.function)) + (1 / k - theta) * one.initial
-            size = rounded(eta**2 * root * max(Fraction(1), (a + alpha) / (a + b)), BITS, up=True)
+        if constants is not None and input_is_bounded(agents.gain.k, rate, alpha):
+            size = input_size(agents, rate, one.initial, root_above(combined.value(graph, one.use.function)))
             spend(40 * graph.n, BITS, BITS, "the input")
             bounds.append([root_above(c) * size for c in constants])
     need(bool(bounds), "a bound of the input though no function and no alpha bound it")
@@ -223,23 +233,3 @@ def roots_above(
     spread = root_above(largest_value(graph, function)) * at.off
     roots = [root_above(each.value(graph, function)) for each in (positions, Vectors(combined, at.scale * c))]
     return roots[0] + spread, roots[1] + (1 + g) * spread
-
-
-def _check_instants(
-    doc: Document, graph: Digraph, agents: Cascade, used: Sequence[Tracked], known: Iterator[Halved]
-) -> None:
-    """Verify roots of Lyapunov functions at instants at which the time left is halved."""
-    section, remaining = doc.section("instants"), Fraction(1)
-    need(1 <= len(section) <= MANY_INSTANTS, f"no instants, or more than {MANY_INSTANTS}")
-    doc.open("agent-instants", "instants")
-    for row in section:
-        if (at := next(known, None)) is None:
-            raise RejectedError("the agents are not enclosed at an instant")
-        remaining /= 2
-        need(len(row) == 2 * len(used), f"an instant has not {2 * len(used)} entries")
-        for one, told in zip(used, zip(row[::2], row[1::2], strict=True), strict=True):
-            if any(x is not None for x in told):
-                least = roots_above(graph, agents, one.use.function, at, remaining)
-                holds = all(x is None or x >= y for x, y in zip(told, least, strict=True))
-                need(holds, "a Lyapunov function is larger at an instant")
-    doc.done(f"{len(section)} instants")

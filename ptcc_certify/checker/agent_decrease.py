@@ -32,11 +32,12 @@ def check_decrease(doc: Document, agents: Agents, used: Sequence[Function]) -> N
     numbers = doc.open("agent-decrease", "agents")
     need(numbers["rate"] == agents.rate, "the rate is another than that of the agents")
     _check_points(agents)
-    F = _form(agents, _uncapped(agents))
+    F = _while_growing(agents)
     for low, high in pairwise(agents.points):
         need(nonnegative_between(F, low, high), "the decrease is not proved between two points")
     if agents.cap is not None:
-        (at_cap,) = _form(agents, [_constant(agents, 1 / agents.cap)])
+        A = scaled_matrix(agents.plant, agents.own, Fraction(0), 1 / agents.cap)
+        (at_cap,) = decrease_form(agents.scaled_W, agents.rate, [A])
         need(semidefinite(at_cap), "the decrease is not proved at the cap of the gain")
     doc.done(f"r = {down(agents.rate)}, {max(len(agents.points) - 1, 0)} intervals")
     numbers = doc.open("agent-coupling", "agents")
@@ -85,7 +86,7 @@ def check_phases(doc: Document, agents: Agents, used: Sequence[Used]) -> None:
         scale = coupling * rates[number]
         own = replace(agents, W=[[x / scale for x in row] for row in W], coupling=1 / rates[number], rate=rate)
         _check_gains(own)
-        F = _form(own, _uncapped(own))
+        F = _while_growing(own)
         holds = all(nonnegative_between(F, low, high) for low, high in pairwise(points))
         need(holds, "the decrease of a phase is not proved between two points")
         former[number] = W, points[-1]
@@ -112,39 +113,51 @@ def _check_gains(agents: Agents) -> None:
     need(products == [0] * (agents.n - 1) + [own[0] * scale], "K is not c b'W^-1")
 
 
-def _zeros(n: int) -> Rows:
-    return [[Fraction(0)] * n for _ in range(n)]
+def _while_growing(agents: Agents) -> list[Matrix]:
+    """Return what has to be positive semidefinite while the gain grows, by powers of ``zeta``."""
+    A = scaled_polynomial(agents.plant, agents.own, agents.gain.rho1, agents.gain.k)
+    return decrease_form(agents.scaled_W, agents.rate, A)
 
 
-def _uncapped(agents: Agents) -> list[Rows]:
-    """Return ``A_z`` as a polynomial in ``zeta``: ``N - theta J - b (f + a_z)'``, ``theta = (1 - rho1 zeta)^2 / k``."""
-    n, rho1, k = agents.n, agents.gain.rho1, agents.gain.k
-    result = [_zeros(n) for _ in range(max(n, 2) + 1)]
+def scaled_matrix(plant: Sequence[Fraction], own: Sequence[Fraction], theta: Fraction, zeta: Fraction) -> Rows:
+    """Return ``A_z = N - theta J - b (f + a_z)'``.
+
+    Examples
+    --------
+    >>> zero, one = Fraction(0), Fraction(1)
+    >>> scaled_matrix((zero, one), (zero, zero), one, zero)
+    [[Fraction(0, 1), Fraction(1, 1)], [Fraction(0, 1), Fraction(-1, 1)]]
+    """
+    n = len(plant)
+    result = [[Fraction(j == i + 1) - theta * i * (i == j) for j in range(n)] for i in range(n)]
+    for i in range(n):
+        result[n - 1][i] -= own[i] + plant[i] * zeta ** (n - i)
+    return result
+
+
+def scaled_polynomial(plant: Sequence[Fraction], own: Sequence[Fraction], rho1: Fraction, k: Fraction) -> list[Rows]:
+    """Return ``A_z`` as a polynomial in ``zeta`` while the gain grows: ``theta = (1 - rho1 zeta)^2 / k``."""
+    n = len(plant)
+    result = [[[Fraction(0)] * n for _ in range(n)] for _ in range(max(n, 2) + 1)]
     for power, theta in enumerate((1 / k, -2 * rho1 / k, rho1**2 / k)):
         for i in range(n):
             result[power][i][i] -= i * theta
     for i in range(n - 1):
         result[0][i][i + 1] += 1
     for i in range(n):
-        result[0][n - 1][i] -= agents.own[i]
-        result[n - i][n - 1][i] -= agents.plant[i]
+        result[0][n - 1][i] -= own[i]
+        result[n - i][n - 1][i] -= plant[i]
     return result
 
 
-def _constant(agents: Agents, zeta: Fraction) -> Rows:
-    """Return ``A_z`` at the cap: ``theta = 0``."""
-    n = agents.n
-    result = [[Fraction(int(j == i + 1)) for j in range(n)] for i in range(n)]
-    for i in range(n):
-        result[n - 1][i] -= agents.own[i] + agents.plant[i] * zeta ** (n - i)
-    return result
+def decrease_form(scaled_W: tuple[Matrix, int], rate: Fraction, A: Sequence[Rows]) -> list[Matrix]:
+    """Return ``b b' - r W - A_z W - W A_z'`` by powers of ``zeta``, times one positive integer.
 
-
-def _form(agents: Agents, A: Sequence[Rows]) -> list[Matrix]:
-    """Return ``b b' - r W - A_z W - W A_z'`` by powers of ``zeta``, times one positive integer."""
-    n, (W, own) = agents.n, agents.scaled_W
+    ``W`` is in integers over a scale.
+    """
+    (W, own), n = scaled_W, len(scaled_W[0])
     rows, unit = integers([row for part in A for row in part])
-    p, q = agents.rate.as_integer_ratio()
+    p, q = rate.as_integer_ratio()
     bits, width = longest(chain.from_iterable(W)) + q.bit_length(), longest(chain.from_iterable(rows))
     spend(2 * len(A) * n**3, bits, width, "the decrease of one agent")
     scale, result = own * unit, []

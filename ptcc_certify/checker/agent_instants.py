@@ -25,7 +25,7 @@ from typing import NamedTuple
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.numbers import integers, longest
 from lmi.exact.work import spend
-from ptcc_certify.checker.agent_bounds import Begin, Used, Weights
+from ptcc_certify.checker.agent_bounds import Begin, Weights
 from ptcc_certify.checker.agent_model import Agents, Cascade
 from ptcc_certify.checker.agent_motion import States
 from ptcc_certify.checker.digraph import Digraph
@@ -211,22 +211,35 @@ def value_above(begin: Begin, function: Function, at: Halved) -> Fraction:
     return (root_above(begin.value(function, (at.columns, at.scale))) + root_above(spread) * at.off) ** 2
 
 
-def check_instants(doc: Document, begin: Begin | None, used: Sequence[Used]) -> None:
-    """Verify Lyapunov functions at instants at which the time left is halved."""
-    if "instants" not in doc.data:
-        return
-    if begin is None or begin.agents.cap is not None:
-        raise RejectedError("instants without initial states, or of a gain that is capped")
-    section = doc.section("instants")
+def check_instants(
+    doc: Document,
+    known: Iterator[Halved],
+    functions: int,
+    each: int,
+    least: Callable[[int, Halved, Fraction], Sequence[Fraction]],
+) -> None:
+    """Verify what Lyapunov functions are worth at instants at which the time left is halved.
+
+    Parameters
+    ----------
+    doc : Document
+    known : iterator of Halved
+    functions, each : int
+        How many are used, and how many numbers are told of each.
+    least : callable
+        What these are at least, of function ``k``, at an instant where ``1 - t/T`` is a number.
+    """
+    section, remaining = doc.section("instants"), Fraction(1)
     need(1 <= len(section) <= MANY_INSTANTS, f"no instants, or more than {MANY_INSTANTS}")
     doc.open("agent-instants", "instants")
-    graph, agents = begin.graph, begin.agents
-    known = halvings(agents, graph.laplacian_product, graph.unit, begin.states, begin.offsets)
     for row in section:
         if (at := next(known, None)) is None:
             raise RejectedError("the agents are not enclosed at an instant")
-        need(len(row) == len(used), f"an instant has not {len(used)} entries")
-        for use, value in zip(used, row, strict=True):
-            holds = value is None or value >= value_above(begin, use.function, at)
-            need(holds, "a Lyapunov function is larger at an instant")
+        remaining /= 2
+        need(len(row) == each * functions, f"an instant has not {each * functions} entries")
+        for k in range(functions):
+            told = row[each * k : each * (k + 1)]
+            if any(x is not None for x in told):
+                holds = all(x is None or x >= y for x, y in zip(told, least(k, at, remaining), strict=True))
+                need(holds, "a Lyapunov function is larger at an instant")
     doc.done(f"{len(section)} instants")

@@ -31,7 +31,7 @@ def check_motion(doc: Document, agents: Chains, M: Sequence[Sequence[Interval]])
     doc.open("agent-motion", "agents")
     n = agents.n
     need(len(M) == n and all(len(row) == n for row in M), f"motion has not {n} rows of {n} entries")
-    true, radius = _motion(agents)
+    true, radius = motion_of(agents)
     for row, exact_row in zip(M, true, strict=True):
         for (mid, wide), (low, high) in zip(row, exact_row, strict=True):
             need(mid - wide <= low - radius and high + radius <= mid + wide, "the common motion is another")
@@ -40,7 +40,31 @@ def check_motion(doc: Document, agents: Chains, M: Sequence[Sequence[Interval]])
     return M
 
 
-def _motion(agents: Chains) -> tuple[list[list[Interval]], Fraction]:
+def check_ends(
+    doc: Document, agents: Chains, final: FinalState, section: Any, decays: bool, derivatives: int | None = None
+) -> bool:
+    """Verify the common motion and the final states; return whether agreement and where it happens were proved.
+
+    Parameters
+    ----------
+    section : AgentsSection or CascadeSection
+    decays : bool
+        Whether a Lyapunov function is used.
+    derivatives : int, optional
+        Of how many final values may be told; by default of all.
+    """
+    doc.at = "agents.motion"
+    M = check_motion(doc, agents, section.motion)
+    doc.at = "agents.final_state"
+    proved = doc.sections["influence"] is not None and (decays or not final.structure.graph.listening)
+    if section.final_state is not None:
+        states = section.initial_state
+        need(states is not None and proved, "a final state without initial states or a proof")
+        check_final_states(doc, agents, final, M[:derivatives], states, section.offsets, section.final_state)
+    return proved
+
+
+def motion_of(agents: Chains, bits: int = BITS) -> tuple[list[list[Interval]], Fraction]:
     """Return ends of the entries of ``M``, and how far it may be beyond them."""
     n, T = agents.n, agents.gain.T
     zero = Fraction(0)
@@ -48,11 +72,11 @@ def _motion(agents: Chains) -> tuple[list[list[Interval]], Fraction]:
         damping = agents.own[1]
         exponent = (agents.plant[1] + damping * agents.gain.rho1) * T
         need(abs(exponent) <= LARGEST_EXPONENT, f"(a_2 + f_2 rho1) T is above {LARGEST_EXPONENT} in size")
-        low, high = rest_integral(damping * agents.gain.k, exponent)
+        low, high = rest_integral(damping * agents.gain.k, exponent, bits)
         return [[(Fraction(1), Fraction(1)), (T * low, T * high)], [(zero, zero), (zero, zero)]], zero
     companion = [[T if j == i + 1 else zero for j in range(n)] for i in range(n - 1)]
     companion.append([-a * T for a in agents.plant])
-    middle, radius = expm(companion, BITS)
+    middle, radius = expm(companion, bits)
     return [[(x, x) for x in row] for row in middle], radius
 
 

@@ -19,12 +19,12 @@ from ptcc_certify.checker.agent_bounds import (
 )
 from ptcc_certify.checker.agent_cascade import check_cascade
 from ptcc_certify.checker.agent_decrease import check_decrease, check_phases
-from ptcc_certify.checker.agent_instants import check_instants
+from ptcc_certify.checker.agent_instants import Halved, check_instants, halvings, value_above
 from ptcc_certify.checker.agent_model import Agents, OneAgent, agents_of
-from ptcc_certify.checker.agent_motion import check_final_states, check_motion, need_shape, sized_offsets
+from ptcc_certify.checker.agent_motion import check_ends, need_shape, sized_offsets
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import length, need
+from ptcc_certify.checker.reading import RejectedError, length, need
 from ptcc_certify.checker.sections import Ball, ByAgent, Several
 
 
@@ -63,20 +63,11 @@ def check_agents(doc: Document, verified: Verified) -> bool:
     for entry in section.functions:
         used.append(verify_used(doc, verified, entry, used[-1].number if used else -1))
     check_decrease(doc, agents, [use.function for use in used])
-    doc.at = "agents.motion"
-    M = check_motion(doc, agents, section.motion)
-    doc.at = "agents.final_state"
-    final = verified.final
-    proved = doc.sections["influence"] is not None and (bool(used) or not graph.listening)
-    need(
-        (begin is not None and proved) or section.final_state is None,
-        "a final state without initial states or a proof",
-    )
-    if begin is not None and section.final_state is not None:
-        check_final_states(doc, agents, final, M, begin.states, offsets, section.final_state)
+    proved = check_ends(doc, agents, verified.final, section, bool(used))
     _bounds(doc, verified, section, agents, begin, used)
     check_phases(doc, agents, used)
-    check_instants(doc, begin, used)
+    if "instants" in doc.data:
+        _instants(doc, begin, used)
     return proved
 
 
@@ -88,6 +79,19 @@ def _check_document(doc: Document, verified: Verified) -> None:
     need(doc.data["input"] is None, "an input beside that of the agents")
     doc.at = "sliding_variable"
     need(not any(verified.begin.sigma or ()), "agents of order n begin with sliding variables that are 0")
+
+
+def _instants(doc: Document, begin: Begin | None, used: Sequence[Used]) -> None:
+    """Verify Lyapunov functions at instants at which the time left is halved."""
+    if begin is None or begin.agents.cap is not None:
+        raise RejectedError("instants without initial states, or of a gain that is capped")
+
+    def least(k: int, at: Halved, _: Fraction) -> tuple[Fraction]:
+        return (value_above(begin, used[k].function, at),)
+
+    graph = begin.graph
+    known = halvings(begin.agents, graph.laplacian_product, graph.unit, begin.states, begin.offsets)
+    check_instants(doc, known, len(used), 1, least)
 
 
 def _bounds(

@@ -1,8 +1,7 @@
 """Deadlines of agents of order n that are tried, and the search for the shortest one within a limit of the input.
 
 The search is bisection with secants in the logarithms of deadline and bound. Every candidate is proved, by
-:func:`~ptcc_certify.certificate.agents_part.prove_agents` or
-:func:`~ptcc_certify.certificate.cascade_part.prove_cascade`, and compared with the limit exactly; it ends where a
+:func:`~ptcc_certify.certificate.agents_part.prove_agents`, and compared with the limit exactly; it ends where a
 deadline keeps the limit and one that is shorter by a thousandth does not. The bound need not be monotone in the
 deadline: agents may fly towards each other.
 """
@@ -19,7 +18,6 @@ from lmi.exact.decimal_rounding import up
 from ptcc_certify.bounds.input.tightest_bound import log
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.agents_part import prove_agents
-from ptcc_certify.certificate.cascade_part import prove_cascade
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.gain_design.request import Request
 from ptcc_certify.model import Protocol
@@ -111,17 +109,9 @@ class Search:
     def _prove(self, T: Fraction) -> Candidate | None:
         first, protocol = self.base.proof.agents, at_deadline(self.template, T)
         assert first is not None
-        prove = prove_agents if self.agents.cascade is None else prove_cascade
         try:
-            part: AgentsAnswer = prove(
-                self.base.graph_proof.structure,
-                protocol,
-                self.agents,
-                self.base.graph_proof.functions,
-                self.base.graph_proof.influence,
-                first.protocol.offsets,
-                first.initial_state,
-            )
+            states = first.protocol.offsets, first.initial_state
+            part = prove_agents(self.base.graph_proof, protocol, self.agents, *states)
         except NoCertificate:
             return None
         return Candidate(T, protocol, part)

@@ -18,6 +18,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from lmi.exact.decimal_rounding import up
+from ptcc_certify.bounds.agents.each_agent import scaled_states
 from ptcc_certify.bounds.agents.shortest_time import shortest_time
 from ptcc_certify.bounds.final_state.enclosed_ends import agents_ends
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
@@ -165,14 +166,13 @@ def _least_time(base: Certificate, request: Request) -> Fraction | None:
         any(part.protocol.own) or not base.graph_proof.influence.exact
     ):  # where agents that rest end depends on the gains
         return None
-    zero, offsets = Fraction(0), part.protocol.offsets
+    offsets = part.protocol.offsets
     deviations: list[list[list[Fraction]]] = [[[] for _ in row] for row in offsets]
+    states = scaled_states(part.initial_state, offsets, Fraction(1))
     for q in range(part.dimension):
         for i in range(part.order):
-            begin = [
-                agent[q][i] - (h[q] if i == 0 else 0) for agent, h in zip(part.initial_state, offsets, strict=True)
-            ]
-            ends = agents_ends(base.graph_proof.influence, [(x, zero) for x in begin])
+            begin = [agent[q][i] for agent in states]
+            ends = agents_ends(base.graph_proof.influence, [(x, Fraction(0)) for x in begin])
             if any(radius for _, radius in ends):
                 return None
             for k, (x, (end, _)) in enumerate(zip(begin, ends, strict=True)):
@@ -194,8 +194,7 @@ def _unusable(base: Certificate, part: AgentsAnswer, request: Request) -> str | 
         return "no input of single agents is proved for a graph of this size"
     if part.protocol.gain_cap is not None and part.residual is None and not part.alone:
         return "no deviation of single agents is proved for a graph of this size"
-    reaching, forces = part.protocol.base.reaching, abs(part.protocol.plant[0])
-    terms = Fraction(0) if reaching is None else reaching.mu1 * part.dimension
+    terms, forces = part.sliding_terms, abs(part.protocol.plant[0])
     places = forces * max(sum(map(abs, h), Fraction(0)) for h in part.protocol.offsets)
     if terms + places < request.max_input:
         return None

@@ -125,12 +125,6 @@ class AgentsProtocol:
         own = [f" - {near(f)} {_power(n - i)}{_primed('x', i)}" for i, f in enumerate(self.own) if f]
         return " + ".join(terms) + "".join(own)
 
-    def _gain(self, t: ca.SX) -> ca.SX:
-        import casadi as ca
-
-        free = self.gain.expression(t)
-        return free if self.gain_cap is None else ca.fmin(free, float(self.gain_cap))
-
     def input(self, graph: Any, states: Sequence[ca.SX], t: ca.SX, coordinate: int = 0) -> ca.SX:
         """Return ``u`` in one coordinate of space as a CasADi expression.
 
@@ -152,7 +146,7 @@ class AgentsProtocol:
         import casadi as ca
 
         graph = as_graph(graph)
-        eta = self._gain(t)
+        eta = self.gain.capped_expression(t, self.gain_cap)
         n = self.order
         gains = self.gains_at(ca.jacobian(eta, t) / eta**2)
         h = ca.vertcat(*(float(row[coordinate]) for row in self.offsets))
@@ -212,10 +206,7 @@ class AgentsProtocol:
         listener, source = (position_latex(v, shown) for v in "kl")
         pull = rf"\left({source} - \operatorname{{sign}}\left(w_{{kl}}\right) {listener}\right)"
         error = rf"\sum_{{l=1}}^{{N}} w_{{kl}} {pull}"
-        gain = self.gain.latex(numbers=True)
-        if self.gain_cap is not None:
-            gain = rf"\min\left({float(self.gain_cap):g}, {gain}\right)"
-        return [f"e_{{k}} &= {error}", f"g &= {gain}"]
+        return [f"e_{{k}} &= {error}", f"g &= {self.gain.capped_latex(self.gain_cap)}"]
 
     def _repr_latex_(self) -> str:
         return f"$${self.latex()}$$"

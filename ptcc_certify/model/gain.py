@@ -154,6 +154,18 @@ class Gain(Parameters):
         """Return the gain as a CasADi expression of the symbol ``t``."""
         return self._expressions(t, self._numbers())["gain"]
 
+    def capped_expression(self, t: ca.SX, cap: Fraction | None) -> ca.SX:
+        """Return the gain under a cap, if there is one, as a CasADi expression of the symbol ``t``."""
+        import casadi as ca
+
+        free = self.expression(t)
+        return free if cap is None else ca.fmin(free, float(cap))
+
+    def capped_latex(self, cap: Fraction | None) -> str:
+        """Return the LaTeX of the gain under a cap, if there is one, with the parameters as numbers."""
+        free = self.latex()
+        return free if cap is None else rf"\min\left({float(cap):g}, {free}\right)"
+
     def phi_expression(self, t: ca.SX) -> ca.SX:
         """Return ``phi`` as a CasADi expression of the symbol ``t``."""
         return self._expressions(t, self._numbers())["phi"]

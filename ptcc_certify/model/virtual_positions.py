@@ -64,13 +64,6 @@ class TrackingProtocol:
     a2: Fraction
     gain_cap: Fraction | None = None
 
-    def gain_at(self, t: ca.SX) -> ca.SX:
-        """Return the gain before ``T``, capped or not, as a CasADi expression."""
-        import casadi as ca
-
-        gain = self.gain.expression(t)
-        return gain if self.gain_cap is None else ca.fmin(gain, float(self.gain_cap))
-
     def input(self, x: ca.SX, v: ca.SX, z: ca.SX, moved: ca.SX, g: ca.SX, slope: ca.SX) -> ca.SX:
         """Return ``u``; ``moved`` is ``z'``, ``g`` the gain and ``slope`` its derivative."""
         a1, a2 = float(self.a1), float(self.a2)
@@ -86,7 +79,7 @@ class TrackingProtocol:
         graph = as_graph(graph)
         t = ca.SX.sym("t")
         x, v, z = (symbols(name, graph) for name in "xvz")
-        g = self.gain_at(t)
+        g = self.gain.capped_expression(t, self.gain_cap)
         moved = g * coupling(graph, z)
         u = self.input(x, v, z, moved, g, ca.jacobian(g, t))
         return {"t": t, "x": ca.vertcat(x, v, z), "ode": ca.vertcat(v, u, moved)}
@@ -106,13 +99,10 @@ class TrackingProtocol:
         names = ("x_{k}", r"\dot{x}_{k}", "z_{k}", r"\dot{z}_{k}", "g", r"\dot{g}")
         u = self.input(*map(ca.SX.sym, names))
         pull = r"z_{l} - \operatorname{sign}\left(w_{kl}\right) z_{k}"
-        gain = self.gain.latex(numbers=True)
-        if self.gain_cap is not None:
-            gain = rf"\min\left({float(self.gain_cap):g}, {gain}\right)"
         rows = [
             f"u_{{k}} &= {to_latex(u)}",
             rf"\dot{{z}}_{{k}} &= g \sum_{{l=1}}^{{N}} w_{{kl}} \left({pull}\right), \quad z_{{k}}(0) = x_{{k}}(0)",
-            f"g &= {gain}",
+            f"g &= {self.gain.capped_latex(self.gain_cap)}",
         ]
         return aligned(rows)
 

@@ -25,9 +25,12 @@ from ptcc_certify.simulation.members import Members
 from ptcc_certify.simulation.trajectory import ByAgent, csv_text
 
 if TYPE_CHECKING:
+    from fractions import Fraction
+
     import casadi as ca
 
     from ptcc_certify.graphs.digraph import SignedDigraph
+    from ptcc_certify.model.gain import Gain
 
 #: Numbers that are integrated at most.
 MOST_STATES = 3000
@@ -116,16 +119,47 @@ class AgentsTrajectory(ByAgent):
         return f"AgentsTrajectory({N} agents of order {n}{space}, {M} instants, t = 0 .. {self.t[-1]:.6g})"
 
 
-class _Deviations(Motion):
+class AgentsMotion(Motion):
+    """Numbers of every agent up to a cap of the gain, and from there on.
+
+    Parameters
+    ----------
+    graph : SignedDigraph
+    state : (N, S) array
+    gain : Gain
+        Without the cap.
+    cap : Fraction or None
+    rtol : float
+        Of CVODES.
+    """
+
+    def __init__(self, graph: SignedDigraph, state: np.ndarray, gain: Gain, cap: Fraction | None, rtol: float):
+        largest = max(float(np.abs(state).max(initial=0)), 1e-300)
+        super().__init__(Members(graph), state, Tolerances(rtol, rtol * largest))
+        self._gain, self._cap = gain, cap
+        self._options |= {"max_num_steps": 200_000}
+
+    def run(self, q: np.ndarray, turn: float) -> np.ndarray:
+        """Return (M, N, S) states where ``1 - t/T`` is ``q``; from ``turn`` on the gain is capped."""
+        states, early, T = np.zeros((q.size, *self.state.shape)), q >= turn, float(self._gain.T)
+        states[early] = self.state
+        if turn < 1:
+            phase = Phase(0.0, T, float(self._gain.rho1), float(self._gain.pole))
+            states[early] = self.sample(phase, -np.log(q[early]), -math.log(max(turn, float(q[-1]))))
+        if turn and not early.all():
+            phase = Phase(T * (1 - turn), T * turn, float(self._cap or 0), past=True)
+            states[~early] = self.sample(phase, 1 - q[~early] / turn, 1.0)
+        return states
+
+
+class _Deviations(AgentsMotion):
     """``z`` on one stretch of time after the other; ``d`` coordinates of ``n`` numbers side by side."""
 
     def __init__(
         self, graph: SignedDigraph, state: np.ndarray, block: np.ndarray, of: AgentsProtocol, rate: float, rtol: float
     ):
-        largest = max(float(np.abs(state).max(initial=0)), 1e-300)
-        super().__init__(Members(graph), state, Tolerances(rtol, rtol * largest))
+        super().__init__(graph, state, of.gain, of.gain_cap, rtol)
         self._block, self._of, self._rate = block, of, rate
-        self._options |= {"max_num_steps": 200_000}
         for key in ("newton_scheme", "use_preconditioner", "max_krylov"):
             self._options.pop(key, None)
 
@@ -133,12 +167,11 @@ class _Deviations(Motion):
         """Return the slope of the deviations on the clock of the phase."""
         import casadi as ca
 
-        n = self._of.order
-        rho1, k = float(self._of.gain.rho1), float(self._of.gain.pole)
+        n, k = self._of.order, float(self._gain.pole)
         R = phase.rate(z, ca.exp)
         g = phase.nominal(R)
         zeta = R / g
-        theta = ca.MX(0) if phase.past else (1 - rho1 * zeta) ** 2 / k
+        theta = ca.MX(0) if phase.past else (1 - float(self._gain.rho1) * zeta) ** 2 / k
         A = ca.MX(ca.DM(np.eye(n, k=1) + self._rate / 2 * np.eye(n))) - theta * ca.DM(np.diag(np.arange(float(n))))
         plant, own = (list(map(float, numbers)) for numbers in (self._of.plant, self._of.own))
         last = ca.hcat([-own[i] - plant[i] * zeta ** (n - i) for i in range(n)])
@@ -184,15 +217,13 @@ def simulate_agents(
     SimulationError
         The integrator failed, or there are too many agents.
     """
-    samples = whole_number(samples, "samples", 2, 100_000)
     if not (isinstance(remaining, float | int) and 0 < remaining < 1):
         raise ParameterError("remaining", f"= {shorten(str(remaining))} is not between 0 and 1; give 1e-6, say")
     xi = np.array(states, dtype=float)
     N, d, n = xi.shape
     if N * d * n > MOST_STATES:
         raise SimulationError(f"more than {MOST_STATES} numbers to integrate; simulate fewer agents")
-    q = np.unique(np.concatenate([np.geomspace(remaining, 1, samples), np.linspace(remaining, 1, samples)]))[::-1]
-    q = q if protocol.gain_cap is None else np.append(q, 0.0)
+    q = shares_left(remaining, samples, protocol.gain_cap)
     h = np.array([[float(x) for x in row] for row in protocol.offsets])
     xi[:, :, 0] -= h
     U, kernel, block = _split(graph)
@@ -201,7 +232,10 @@ def simulate_agents(
     zeta0 = 1 / protocol.value(1.0)
     scale = np.tile(zeta0 ** np.arange(n), d)
     clock = protocol.clock(q)
-    z = _integrate(graph, protocol, coordinates[: U.shape[1]] * scale, block, rate, q, rtol)
+    begin = coordinates[: U.shape[1]] * scale
+    z = np.zeros((len(q), *begin.shape))
+    if np.abs(begin).max(initial=0):
+        z = _Deviations(graph, begin, block, protocol, rate, rtol).run(q, protocol.capped_from)
     scaled = np.moveaxis(np.einsum("km,imc->ikc", U, z).reshape(len(q), N, d, n), 0, -1)
     free = np.einsum("mij,kdj->kdim", _free_motion(protocol, q), common.reshape(N, d, n))
     eta = np.array([protocol.value(x) for x in q])
@@ -219,6 +253,13 @@ def simulate_agents(
     return _with_deadline(run, common.reshape(N, d, n), h, protocol.agree_if_above(slowest))
 
 
+def shares_left(remaining: float, samples: int, cap: Fraction | None) -> np.ndarray:
+    """Return instants as ``1 - t/T``: so many uniform in ``tau``, as many in ``t``; with ``T`` itself under a cap."""
+    samples = whole_number(samples, "samples", 2, 100_000)
+    q = np.unique(np.concatenate([np.geomspace(remaining, 1, samples), np.linspace(remaining, 1, samples)]))[::-1]
+    return q if cap is None else np.append(q, 0.0)
+
+
 def _split(graph: SignedDigraph) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return a basis ``U`` of the range of ``L``, one of its kernel, and ``B`` with ``L U = U B``."""
     L = graph.laplacian().toarray()
@@ -226,34 +267,6 @@ def _split(graph: SignedDigraph) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     rank = int((sizes > _ZERO * max(sizes.max(initial=0.0), 1e-300)).sum())
     U, kernel = left[:, :rank], right[rank:].T
     return U, kernel, U.T @ L @ U
-
-
-def _integrate(
-    graph: SignedDigraph,
-    protocol: AgentsProtocol,
-    state: np.ndarray,
-    block: np.ndarray,
-    rate: float,
-    q: np.ndarray,
-    rtol: float,
-) -> np.ndarray:
-    """Return ``z`` at the instants."""
-    z = np.zeros((len(q), *state.shape))
-    if not state.size or not np.abs(state).max():
-        return z
-    motion = _Deviations(graph, state, block, protocol, rate, rtol)
-    gain, turn = protocol.gain, protocol.capped_from
-    T, early = float(gain.T), q >= turn
-    if turn < 1:
-        end = -math.log(max(turn, float(q[-1])))
-        phase = Phase(0.0, T, float(gain.rho1), float(gain.pole))
-        z[early] = motion.sample(phase, -np.log(q[early]), end)
-    if turn and not early.all():
-        phase = Phase(T * (1 - turn), T * turn, float(protocol.gain_cap or 0), past=True)
-        z[~early] = motion.sample(phase, 1 - q[~early] / turn, 1.0)
-        if turn == 1:
-            z[early] = state
-    return z
 
 
 def _free_motion(protocol: AgentsProtocol, q: np.ndarray) -> np.ndarray:

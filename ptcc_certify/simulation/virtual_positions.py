@@ -16,12 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.graphs.rationals import whole_number
 from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.simulation.agents import MOST_STATES, AgentsTrajectory
-from ptcc_certify.simulation.cvodes import Motion, Phase, Tolerances
+from ptcc_certify.simulation.agents import MOST_STATES, AgentsMotion, AgentsTrajectory, shares_left
 from ptcc_certify.simulation.late_messages import simulate_late
-from ptcc_certify.simulation.members import Members
 from ptcc_certify.simulation.run import simulate
 
 if TYPE_CHECKING:
@@ -34,6 +31,7 @@ if TYPE_CHECKING:
     from ptcc_certify.model.late_messages import LateMessages
     from ptcc_certify.model.moving_leaders import MovingLeaders
     from ptcc_certify.model.virtual_positions import TrackingProtocol
+    from ptcc_certify.simulation.cvodes import Phase
     from ptcc_certify.simulation.trajectory import Trajectory
 
 #: Instants of a run that vehicles follow.
@@ -42,22 +40,20 @@ _SAMPLES = 1001
 _NEAREST = 1e-5
 
 
-class _Tracking(Motion):
+class _Tracking(AgentsMotion):
     """``x``, ``w`` and ``z`` of every agent, on one stretch of time after the other."""
 
     moved = 1
 
     def __init__(self, graph: SignedDigraph, state: np.ndarray, of: TrackingProtocol, rtol: float):
-        size = max(float(np.abs(state).max(initial=0)), 1e-300)
-        super().__init__(Members(graph), state, Tolerances(rtol, rtol * size))
-        self._of = of
-        self._options |= {"max_num_steps": 200_000}
+        super().__init__(graph, state, of.gain, of.gain_cap, rtol)
+        self._a1, self._a2 = float(of.a1), float(of.a2)
 
     def slope(self, x: ca.MX, phase: Phase, z: ca.MX) -> ca.MX:
         """Return the slope of positions, scaled velocities and virtual positions on the clock of the phase."""
         import casadi as ca
 
-        a1, a2, gain = float(self._of.a1), float(self._of.a2), self._of.gain
+        a1, a2, gain = self._a1, self._a2, self._gain
         R = phase.rate(z, ca.exp)
         h = phase.nominal(R)
         theta = ca.MX(0) if phase.past else (1 - float(gain.rho1) * R / h) ** 2 / float(gain.pole)
@@ -107,18 +103,19 @@ def simulate_vehicles(
     >>> run.positions[:, 0, -1].round(4)
     array([1., 1.])
     """
-    N, samples = graph.n_nodes, whole_number(samples, "samples", 2, 100_000)
-    if 3 * N > MOST_STATES:
+    if 3 * graph.n_nodes > MOST_STATES:
         raise ParameterError(f"more than {MOST_STATES} numbers to integrate; simulate fewer agents")
-    q = np.unique(np.concatenate([np.geomspace(remaining, 1, samples), np.linspace(remaining, 1, samples)]))[::-1]
-    q = q if protocol.gain_cap is None else np.append(q, 0.0)
-    base, T = protocol.gain, float(protocol.gain.T)
-    limits = GainLimits(gain_cap=protocol.gain_cap).limit(base)
+    gain, cap, T = protocol.gain, protocol.gain_cap, float(protocol.gain.T)
+    q = shares_left(remaining, samples, cap)
+    turn = 0.0
+    if cap is not None:
+        turn = 1.0 if cap <= gain.first else float(gain.pole) / (T * (float(cap) - float(gain.rho1)))
+    limits = GainLimits(gain_cap=cap).limit(gain)
     g = limits.value(T * (1 - q), remaining=q)
-    if protocol.gain_cap is not None:
+    if cap is not None:
         g = np.maximum.accumulate(g)  # which stays what it came to
     first = np.array([x0, np.asarray(v0, dtype=float) / g[0], x0], dtype=float).T
-    states = _integrate(graph, protocol, first, q, rtol)
+    states = _Tracking(graph, first, protocol, rtol).run(q, turn)
     x, w, z = states[:, :, 0].T, states[:, :, 1].T, states[:, :, 2].T
     a1, a2 = float(protocol.a1), float(protocol.a2)
     theta = _slope(protocol, g) / g**2
@@ -127,25 +124,6 @@ def simulate_vehicles(
     moved = np.stack([x, w * g], axis=1)[:, None]
     instants = T * (1 - q), q, limits.clock(T * (1 - q), remaining=q)
     return _motion_of(graph, protocol, instants, moved, u, rtol)
-
-
-def _integrate(
-    graph: SignedDigraph, protocol: TrackingProtocol, first: np.ndarray, q: np.ndarray, rtol: float
-) -> np.ndarray:
-    """Return (M, N, 3) states at the instants: up to the cap of the gain, and from there on."""
-    gain, cap, T = protocol.gain, protocol.gain_cap, float(protocol.gain.T)
-    rho1, k = float(gain.rho1), float(gain.pole)
-    turn = 0.0
-    if cap is not None:
-        turn = 1.0 if cap <= gain.first else k / (T * (float(cap) - rho1))
-    motion, states, early = _Tracking(graph, first, protocol, rtol), np.zeros((q.size, *first.shape)), q >= turn
-    states[early] = first
-    if turn < 1:
-        states[early] = motion.sample(Phase(0.0, T, rho1, k), -np.log(q[early]), -math.log(max(turn, float(q[-1]))))
-    if turn:
-        later = Phase(T * (1 - turn), T * turn, float(cap or 0), past=True)
-        states[~early] = motion.sample(later, 1 - q[~early] / turn, 1.0)
-    return states
 
 
 def _slope(protocol: TrackingProtocol, g: np.ndarray) -> np.ndarray:

@@ -31,6 +31,8 @@ from lmi.exact.decimal_rounding import down
 from lmi.exact.matrix_polynomials import nonnegative_between, semidefinite
 from lmi.exact.numbers import integers
 from lmi.feedback import feedback_matrix, later_matrices
+from ptcc_certify.checker.agent_bounds import adjugate
+from ptcc_certify.checker.agent_decrease import Rows, decrease_form, scaled_matrix, scaled_polynomial
 
 Matrix = tuple[tuple[Fraction, ...], ...]
 #: Significant bits of the entries of ``W``, and digits of the gains: the first that prove.
@@ -59,9 +61,8 @@ class ScaledAgent:
     Examples
     --------
     >>> zero, one = Fraction(0), Fraction(1)
-    >>> agent = ScaledAgent((zero, zero), (zero, zero), zero, one, 2 * one, None)
-    >>> agent.matrix(one, zero)
-    ((Fraction(0, 1), Fraction(1, 1)), (Fraction(0, 1), Fraction(-1, 1)))
+    >>> ScaledAgent((zero, zero), (zero, zero), zero, one, 2 * one, None).span
+    (Fraction(0, 1), Fraction(1, 2))
     """
 
     plant: tuple[Fraction, ...]
@@ -83,35 +84,20 @@ class ScaledAgent:
             return None
         return (Fraction(0) if self.cap is None else 1 / self.cap), 1 / self.first
 
-    def matrix(self, theta: Fraction, zeta: Fraction) -> Matrix:
-        """Return ``A_z``."""
-        n = self.order
-        last = [-f - a * zeta ** (n - i) for i, (f, a) in enumerate(zip(self.own, self.plant, strict=True))]
-        rows = [[Fraction(j == i + 1) - theta * i * (i == j) for j in range(n)] for i in range(n)]
-        rows[-1] = [x + y for x, y in zip(rows[-1], last, strict=True)]
-        return tuple(map(tuple, rows))
+    @property
+    def at_cap(self) -> Rows | None:
+        """``A_z`` while the gain is capped; None if it never is."""
+        return None if self.cap is None else scaled_matrix(self.plant, self.own, Fraction(0), 1 / self.cap)
 
     @cached_property
-    def coefficients(self) -> list[Matrix]:
+    def coefficients(self) -> list[Rows]:
         """``A_z`` while the gain grows, as a polynomial in ``zeta``, the constant one first."""
-        n, zero = self.order, Fraction(0)
-        theta = [1 / self.k, -2 * self.rho1 / self.k, self.rho1**2 / self.k]
-        powers = []
-        for m in range(max(n, 2) + 1):
-            rows = [[Fraction(m == 0 and j == i + 1) for j in range(n)] for i in range(n)]
-            for i in range(n):
-                rows[i][i] -= i * theta[m] if m < 3 else zero
-            if m == 0:
-                rows[-1] = [x - f for x, f in zip(rows[-1], self.own, strict=True)]
-            elif m <= n:
-                rows[-1][n - m] -= self.plant[n - m]
-            powers.append(tuple(map(tuple, rows)))
-        return powers
+        return scaled_polynomial(self.plant, self.own, self.rho1, self.k)
 
     def vertices(self, points: Sequence[Fraction]) -> list[np.ndarray]:
         """Return matrices in floats whose convex hull holds every ``A_z``: those of Bernstein, and that of the cap."""
         matrices = [A for low, high in pairwise(map(float, points)) for A in self._bernstein(low, high)]
-        return matrices + ([] if self.cap is None else [_floats(self.matrix(Fraction(0), 1 / self.cap))])
+        return matrices + ([] if self.at_cap is None else [_floats(self.at_cap)])
 
     def _bernstein(self, low: float, high: float) -> list[np.ndarray]:
         """Return the Bernstein matrices of ``A_z`` while the gain grows, between two values of ``zeta``."""
@@ -123,7 +109,7 @@ class ScaledAgent:
         return list(np.einsum("ij,jab->iab", shares, np.array(shifted)))
 
 
-def _floats(A: Matrix) -> np.ndarray:
+def _floats(A: Sequence[Sequence[Fraction]]) -> np.ndarray:
     return np.array([[float(x) for x in row] for row in A])
 
 
@@ -195,24 +181,9 @@ def inverse(W: Matrix) -> Matrix:
     >>> inverse(((Fraction(2), Fraction(1)), (Fraction(1), Fraction(1))))[0]
     (Fraction(1, 1), Fraction(-1, 1))
     """
-    n = len(W)
-    rows = [[*row, *(Fraction(i == j) for j in range(n))] for i, row in enumerate(W)]
-    for k in range(n):
-        rows[k] = [x / rows[k][k] for x in rows[k]]
-        for i in range(n):
-            if i != k and rows[i][k]:
-                rows[i] = [x - rows[i][k] * y for x, y in zip(rows[i], rows[k], strict=True)]
-    return tuple(tuple(row[n:]) for row in rows)
-
-
-def margin(A: Matrix, W: Matrix, rate: Fraction, driven: bool = True) -> Matrix:
-    """Return ``b b' - rate W - A W - W A'``, or this without ``b b'``."""
-    n = len(W)
-    AW = [[sum((A[i][k] * W[k][j] for k in range(n)), Fraction(0)) for j in range(n)] for i in range(n)]
-    return tuple(
-        tuple(Fraction(driven and i == j == n - 1) - rate * W[i][j] - AW[i][j] - AW[j][i] for j in range(n))
-        for i in range(n)
-    )
+    whole, scale = integers(W)
+    rows, determinant = adjugate(whole)
+    return tuple(tuple(Fraction(x * scale, determinant) for x in row) for row in rows)
 
 
 def nonnegative(S: Matrix) -> bool:
@@ -231,15 +202,14 @@ def prove_decrease(agent: ScaledAgent, W: Matrix, rate: Fraction) -> tuple[Fract
 
     Intervals are halved where they do not prove it, which ends where ``F > 0``.
     """
-    cap = [] if agent.cap is None else [agent.matrix(Fraction(0), 1 / agent.cap)]
-    if not arithmetic().definite(integers(W)[0]) or not all(nonnegative(margin(A, W, rate)) for A in cap):
+    scaled_W, at_cap = integers(W), agent.at_cap
+    if not arithmetic().definite(scaled_W[0]):
+        return None
+    if at_cap is not None and not semidefinite(decrease_form(scaled_W, rate, [at_cap])[0]):
         return None
     if agent.span is None:
         return ()
-    zero = Fraction(0)
-    parts = [margin(A, W, rate if j == 0 else zero, j == 0) for j, A in enumerate(agent.coefficients)]
-    whole, n = integers([row for part in parts for row in part])[0], len(W)
-    F = [whole[n * j : n * j + n] for j in range(len(parts))]
+    F = decrease_form(scaled_W, rate, agent.coefficients)
     points, todo = [agent.span[0]], [agent.span]
     while todo:
         low, high = todo.pop()

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ptcc_certify.bounds.agents.cascade import drive_integral, input_from, input_is_bounded
+from ptcc_certify.bounds.agents.cascade import drive_integral, input_from
+from ptcc_certify.checker.agent_cascade import input_is_bounded
 from ptcc_certify.model.gain import Gain
 
 F = Fraction

@@ -19,7 +19,7 @@ from oracle_cascade import false_claims_of_cascade, moved
 from scipy.integrate import solve_ivp
 
 from ptcc_certify.bounds.agents.cascade import Roots, course
-from ptcc_certify.bounds.agents.instants import _checked
+from ptcc_certify.bounds.agents.each_agent import checked_graph
 from ptcc_certify.certificate.cascade_part import CascadePart
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.certification import certify
@@ -127,7 +127,7 @@ def enclosed_deviations(certificate: Certificate, remaining: np.ndarray) -> np.n
     states, offsets = part.initial_state or (), part.protocol.offsets
     agents = Cascade(2, len(states[0]), part.protocol.plant, part.protocol.own, None, gain.exact)
     sizes = np.zeros((len(states), 2, len(remaining)))
-    for m, at in enumerate(islice(halvings_of(_checked(part.structure), agents, states, offsets), len(remaining))):
+    for m, at in enumerate(islice(halvings_of(checked_graph(part.structure), agents, states, offsets), len(remaining))):
         for i, x in [(i, [F(y) / at.scale for y in row]) for rows in at.columns for i, row in enumerate(rows)]:
             ends, _ = certificate.influence.apply(x)
             sizes[:, i, m] += [float(one - end) ** 2 for one, end in zip(x, ends, strict=True)]

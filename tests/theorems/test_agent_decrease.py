@@ -8,7 +8,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from ptcc_certify.theorems.agent_decrease import ScaledAgent, agent_matrix, margin, prove_decrease, with_gains
+from ptcc_certify.checker.agent_decrease import scaled_matrix
+from ptcc_certify.theorems.agent_decrease import ScaledAgent, agent_matrix, prove_decrease, with_gains
 
 SEEDS = [pytest.param(seed, marks=pytest.mark.campaign if seed > 2 else ()) for seed in range(40)]
 
@@ -22,15 +23,24 @@ def drawn(seed: int) -> tuple[ScaledAgent, Fraction]:
     return ScaledAgent(plant, (Fraction(0),) * n, rho1, k, rho1 + k / T, cap), Fraction(2 * n) / k
 
 
+def matrix(agent: ScaledAgent, theta: float, zeta: float) -> np.ndarray:
+    """``A_z`` in floats."""
+    rows = scaled_matrix(agent.plant, agent.own, Fraction(theta), Fraction(zeta))
+    return np.array([[float(x) for x in row] for row in rows])
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_decrease_holds_at_every_instant(seed: int):
     agent, rate = drawn(seed)
     proved = agent_matrix(agent, rate, Fraction(1))
     low, high = agent.span or (1 / (agent.cap or 1),) * 2
+    W = np.array([[float(x) for x in row] for row in proved.W])
+    driven = np.zeros_like(W)
+    driven[-1, -1] = 1
     for zeta in np.linspace(float(low), float(high), 50):
         theta = 0.0 if agent.span is None else (1 - float(agent.rho1) * zeta) ** 2 / float(agent.k)
-        F = margin(agent.matrix(Fraction(theta), Fraction(zeta)), proved.W, rate)
-        values = np.linalg.eigvalsh(np.array([[float(x) for x in row] for row in F]))
+        AW = matrix(agent, theta, zeta) @ W
+        values = np.linalg.eigvalsh(driven - float(rate) * W - AW - AW.T)
         assert values[0] >= -1e-12 * max(1.0, values[-1])
 
 
@@ -58,7 +68,7 @@ def test_the_scaled_matrix_is_the_derivative_of_the_scaled_states(seed: int):
     theta = (1 - float(agent.rho1) * zeta) ** 2 / float(agent.k)
     after = (xi + step * zeta * A @ xi) * (zeta - step * zeta * theta) ** np.arange(n)  # ds = step, dt = zeta ds
     change = (after - xi * zeta ** np.arange(n)) / step
-    told = np.array([[float(x) for x in row] for row in agent.matrix(Fraction(theta), Fraction(zeta))])
+    told = matrix(agent, theta, zeta)
     assert np.allclose(change, told @ (xi * zeta ** np.arange(n)), atol=1e-4 * (1 + np.abs(change).max()))
 
 

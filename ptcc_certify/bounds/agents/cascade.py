@@ -34,16 +34,17 @@ from typing import NamedTuple
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_down, float_up
-from lmi.exact.elementary_enclosures import rounded
-from ptcc_certify.bounds.agents.each_agent import States, initial_value, root_product
+from ptcc_certify.bounds.agents.each_agent import States, checked_function, checked_graph, root_product
 from ptcc_certify.bounds.input.tightest_bound import round_up
+from ptcc_certify.checker.agent_cascade import drive_of, input_size
+from ptcc_certify.checker.agent_model import Cascade
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
+from ptcc_certify.model.cascade import CascadeProtocol
 from ptcc_certify.model.gain import Gain
 
-Rows = tuple[tuple[Fraction, ...], ...]
-#: By this share what is formed in floats is enlarged; bits to which what bounds every agent is rounded.
-_ROOM, BITS = 1e-9, 256
+#: By this share what is formed in floats is enlarged.
+_ROOM = 1e-9
 #: Steps of a course, more or less, each by the same share of what remains.
 _STEPS = 400
 
@@ -66,70 +67,32 @@ class Course(NamedTuple):
     pull: np.ndarray
 
 
-def positions_of(states: States, offsets: Sequence[Sequence[Fraction]]) -> Rows:
-    """Return ``x_k(0) - h_k``.
+def checked_agents(protocol: CascadeProtocol) -> Cascade:
+    """Return agents of the cascade as the check reads them."""
+    return Cascade(2, len(protocol.offsets[0]), protocol.plant, protocol.own, None, protocol.gain.exact)
+
+
+def roots_of(
+    structure: Structure, protocol: CascadeProtocol, functions: Sequence[LyapunovFunction], states: States
+) -> tuple[Roots, ...]:
+    """Return what every function is worth at the beginning.
+
+    Of positions less places, ``q(0) = x'(0) - eta e(0)``, ``r(0) = x'(0)/eta + (alpha + theta)(x(0) - h)``, and
+    velocities, as the check forms them.
 
     Examples
     --------
-    >>> one = Fraction(1)
-    >>> positions_of((((3 * one, one),),), [[one]])
-    ((Fraction(2, 1),),)
+    >>> from ptcc_certify.model import NominalProtocol
+    >>> pair, x0 = SignedDigraph.from_edges([("a", "b", 1)]), [1, 0]
+    >>> fast = NominalProtocol(T=1, rho1=1, rho2=4, kappa=1)
+    >>> part = certify(pair, fast, x0, agents=Agents(order=2, cascade=1), asks=Asks(method="paper")).agents
+    >>> roots_of(part.structure, part.protocol, part.functions, part.initial_state) == part.roots
+    True
     """
-    pairs = zip(states, offsets, strict=True)
-    return tuple(tuple(chain[0] - x for chain, x in zip(agent, h, strict=True)) for agent, h in pairs)
-
-
-def tracking_error(structure: Structure, states: States, offsets: Sequence[Sequence[Fraction]], eta: Fraction) -> Rows:
-    """Return ``q_k(0) = x_k'(0) - eta e_k(0)``.
-
-    Examples
-    --------
-    >>> allies, (zero, one) = analyse(SignedDigraph.from_edges([("a", "b", 1)])), (Fraction(0), Fraction(1))
-    >>> tracking_error(allies, (((one, zero),), ((zero, one),)), [[zero]] * 2, 2 * one)  # b: 1 - 2 (1 - 0)
-    ((Fraction(0, 1),), (Fraction(-1, 1),))
-    """
-    X, rows = positions_of(states, offsets), structure.graph.exact_rows(range(structure.graph.n_nodes))
-    return tuple(
-        tuple(
-            chain[1] + eta * sum((a * X[j][axis] for j, a in row.items()), Fraction(0))
-            for axis, chain in enumerate(agent)
-        )
-        for agent, row in zip(states, rows, strict=True)
-    )
-
-
-def combined_state(states: States, offsets: Sequence[Sequence[Fraction]], gain: Gain, alpha: Fraction) -> Rows:
-    """Return ``r_k(0) = x_k'(0)/eta + (alpha + theta)(x_k(0) - h_k)``, ``theta = eta'/eta^2``, all at time 0.
-
-    Examples
-    --------
-    >>> one, gain = Fraction(1), Gain(T=1, rho1=1, rho2=1, kappa=1)  # eta = 2, theta = 1/4
-    >>> combined_state((((3 * one, one),),), [[one]], gain, one)
-    ((Fraction(3, 1),),)
-    """
-    X, own = positions_of(states, offsets), alpha + gain.first_theta
-    pairs = zip(states, X, strict=True)
-    return tuple(
-        tuple(chain[1] / gain.first + own * x for chain, x in zip(agent, at, strict=True)) for agent, at in pairs
-    )
-
-
-def initial_rows(
-    structure: Structure, states: States, offsets: Sequence[Sequence[Fraction]], gain: Gain, alpha: Fraction
-) -> tuple[Rows, Rows, Rows, Rows]:
-    """Return positions less places, ``q(0)``, ``r(0)`` and velocities, of which :class:`Roots` are."""
-    return (
-        positions_of(states, offsets),
-        tracking_error(structure, states, offsets, gain.first),
-        combined_state(states, offsets, gain, alpha),
-        tuple(tuple(chain[1] for chain in agent) for agent in states),
-    )
-
-
-def root_of(structure: Structure, V: LyapunovFunction, rows: Rows) -> Fraction:
-    """Return ``sqrt(V)`` of one number for each agent and coordinate, rounded up."""
-    one = ((Fraction(1),),)
-    return root_product(initial_value(structure, V, one, tuple(tuple((x,) for x in row) for row in rows)))
+    graph, agents = checked_graph(structure), checked_agents(protocol)
+    drive = drive_of(graph, agents, states, protocol.offsets)
+    vectors = drive.positions, drive.error, drive.combined(agents), drive.velocities
+    return tuple(Roots(*(root_product(x.value(graph, checked_function(V))) for x in vectors)) for V in functions)
 
 
 def drive_integral(gain: Gain, rate: Fraction, alpha: Fraction, remaining: np.ndarray) -> np.ndarray:
@@ -205,19 +168,6 @@ def _falling(x: float, z: np.ndarray) -> np.ndarray:
     return np.abs(np.expm1(-x * z)) / x if x else z
 
 
-def input_is_bounded(k: Fraction, rate: Fraction, alpha: Fraction) -> bool:
-    """Tell whether the input is proved not to grow without limit: ``b k >= 2``, ``alpha k >= 1``.
-
-    Not with both as equations: then its bound grows like ``s``.
-
-    Examples
-    --------
-    >>> [input_is_bounded(Fraction(1), Fraction(r), Fraction(a)) for r, a in ((4, 1), (5, 1), (4, 2), (3, 9))]
-    [False, True, True, False]
-    """
-    return rate * k >= 4 and alpha * k >= 1 and rate * k + alpha * k > 5
-
-
 def input_from(
     gain: Gain,
     alpha: Fraction,
@@ -249,9 +199,7 @@ def input_from(
     >>> [round(float(x), 6) for x in input_from(gain, 2 * one, 4 * one, [4 * one], one, 3 * one, [one])]
     [94.0]
     """
-    k, eta = gain.pole, gain.first
-    a, b = alpha - 1 / k, rate / 2 - 2 / k
-    most = max(Fraction(1), (a + alpha) / (a + b))
-    size = rounded(eta**2 * (combined + (1 / k - gain.first_theta) * state) * most, BITS, up=True)
-    pairs = zip(constants, speeds, strict=True)
-    return tuple(round_up(root_product(c) * size + alpha * eta * speed) for c, speed in pairs)
+    zero = Fraction(0)
+    agents = Cascade(2, 1, (zero, zero), (zero, alpha), None, gain.exact)
+    size, pairs = input_size(agents, rate, state, combined), zip(constants, speeds, strict=True)
+    return tuple(round_up(root_product(c) * size + alpha * gain.first * speed) for c, speed in pairs)

@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_up
-from ptcc_certify.bounds.agents.each_agent import error_constants, root_product
+from ptcc_certify.bounds.agents.each_agent import root_product
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.simulation.agents import AgentsTrajectory
@@ -64,7 +64,7 @@ def compare_agents(
     matrix: AgentMatrix,
     functions: Sequence[LyapunovFunction],
     initial_values: Sequence[Fraction],
-    inputs: Sequence[Sequence[Fraction] | None],
+    error_constants: Sequence[Sequence[Fraction] | None],
     bounds: Sequence[Fraction] | None,
     run: AgentsTrajectory,
 ) -> AgentsComparison | None:
@@ -75,7 +75,7 @@ def compare_agents(
     P = np.linalg.cholesky(np.array([[float(x) for x in row] for row in matrix.inverse])).T
     decay = 0.0
     deviation, relative = np.full((N, n), np.inf), np.full(N, np.inf)
-    for V, value, input_constants in zip(functions, initial_values, inputs, strict=True):
+    for V, value, constants in zip(functions, initial_values, error_constants, strict=True):
         if not value:
             continue
         roots = V.scaled(V.coordinates_of(z, L))
@@ -84,7 +84,6 @@ def compare_agents(
         if V.deviation is not None:
             rows = [[float_up(root_product(c, matrix.W[i][i], value)) for i in range(n)] for c in V.deviation.agents]
             deviation = np.minimum(deviation, rows)
-        constants = input_constants if V.matrix is not None else error_constants(structure, V)
         if constants is not None:
             gain = matrix.gains[-1] * matrix.coupling
             relative = np.minimum(relative, [float_up(root_product(gain, c, value)) for c in constants])

@@ -19,11 +19,16 @@ from fractions import Fraction
 import numpy as np
 
 from ptcc_certify.bounds.input.effort_bounds import full_constants
+from ptcc_certify.checker.agent_bounds import Begin
+from ptcc_certify.checker.agent_model import Agents
+from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.input_formulas import root_above
+from ptcc_certify.checker.lyapunov import Function
+from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.model.agents_protocol import AgentsProtocol
-from ptcc_certify.theorems.agent_decrease import Matrix
+from ptcc_certify.theorems.agent_decrease import AgentMatrix, Matrix
 
 #: Of every agent, in every coordinate of space, its position, velocity and so on.
 States = tuple[tuple[tuple[Fraction, ...], ...], ...]
@@ -45,32 +50,6 @@ def scaled_states(states: States, offsets: Sequence[Sequence[Fraction]], zeta: F
         )
         for agent, offset in zip(states, offsets, strict=True)
     )
-
-
-def initial_value(structure: Structure, V: LyapunovFunction, P: Matrix, scaled: States) -> Fraction:
-    """Return ``V = sum_kl Om_kl z_k'P z_l`` of scaled states, summed over the coordinates of space."""
-    rows, n = structure.graph.exact_rows(range(structure.graph.n_nodes)), len(P)
-    total = Fraction(0)
-    for q in range(len(scaled[0])):
-        columns = []
-        for i in range(n):
-            x = [agent[q][i] for agent in scaled]
-            error = [-sum((a * x[j] for j, a in row.items()), Fraction(0)) for row in rows]
-            columns.append(V.exact_coordinates_of(x, error))
-        for i in range(n):
-            for j in range(i + 1):
-                total += (1 + (i != j)) * P[i][j] * _product(V, columns[i], columns[j])
-    return total
-
-
-def _product(V: LyapunovFunction, x: Sequence[Fraction], y: Sequence[Fraction]) -> Fraction:
-    """Return ``x' Om y``."""
-    if V.matrix is None:
-        return sum((w * a * b for w, a, b in zip(V.weights, x, y, strict=True)), Fraction(0))
-    parts = (
-        a * sum((p * b for p, b in zip(row, y, strict=True)), Fraction(0)) for a, row in zip(x, V.matrix, strict=True)
-    )
-    return sum(parts, Fraction(0))
 
 
 def first_inputs(structure: Structure, protocol: AgentsProtocol, states: States) -> tuple[Fraction, ...]:
@@ -139,6 +118,28 @@ def least_input(
         return math.inf
 
     return min(decaying, key=lambda V: (size(V), -V.proved_rate)).proved_rate
+
+
+def checked_begin(structure: Structure, protocol: AgentsProtocol, matrix: AgentMatrix, states: States) -> Begin:
+    """Return where agents of order n begin, as the check reads it."""
+    numbers = protocol.gains, matrix.coupling, matrix.W, matrix.rate, matrix.points
+    chains = protocol.order, len(protocol.offsets[0]), protocol.plant, protocol.own, protocol.gain_cap
+    agents = Agents(*chains, protocol.gain.exact, *numbers)
+    return Begin(agents, checked_graph(structure), states, protocol.offsets)
+
+
+def checked_function(V: LyapunovFunction) -> Function:
+    """Return a Lyapunov function as the check reads it, without its constants."""
+    by_rows = (V.nodes, Numbers(V.weights)) if V.form is None else None
+    return Function("", V.proved_rate, Fraction(1), V.form, by_rows)
+
+
+def checked_graph(structure: Structure) -> Digraph:
+    """Return a graph as the check reads it."""
+    rows = structure.graph.exact_rows(range(structure.graph.n_nodes))
+    edges = [(s, t, -row[s]) for t, row in enumerate(rows) for s in sorted(row) if s != t]
+    source, target, weights = zip(*edges, strict=True) if edges else ((), (), ())
+    return Digraph(structure.graph.labels, source, target, weights, 1)
 
 
 def root_product(*factors: Fraction) -> Fraction:

@@ -15,18 +15,14 @@ from itertools import islice
 
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.work import WorkError, limited
-from ptcc_certify.bounds.agents.each_agent import States
+from ptcc_certify.bounds.agents.cascade import checked_agents
+from ptcc_certify.bounds.agents.each_agent import States, checked_function, checked_graph
 from ptcc_certify.checker.agent_bounds import Begin
 from ptcc_certify.checker.agent_cascade import halvings_of, roots_above
 from ptcc_certify.checker.agent_instants import halvings, value_above
-from ptcc_certify.checker.agent_model import Agents, Cascade
-from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
-from ptcc_certify.model.agents_protocol import AgentsProtocol
 from ptcc_certify.model.cascade import CascadeProtocol
-from ptcc_certify.theorems.agent_decrease import AgentMatrix
 
 Values = tuple[Fraction | None, ...]
 #: Instants at most; GB whose share of work they may take, a small part of what a check may.
@@ -35,28 +31,20 @@ INSTANTS, WORK = 10, 0.1
 BITS = 64
 
 
-def instant_values(
-    structure: Structure,
-    protocol: AgentsProtocol,
-    matrix: AgentMatrix,
-    functions: Sequence[LyapunovFunction],
-    states: States,
-) -> tuple[Values, ...]:
+def instant_values(begin: Begin, functions: Sequence[LyapunovFunction]) -> tuple[Values, ...]:
     """Return bounds of ``V`` at ``T (1 - 2^-i)``, ``i = 1, 2, ..``, of those functions that bound a deviation best.
 
     Empty where the gain is capped; as many as little work allows.
     """
     known = {k: V for k, V in enumerate(functions) if V.deviation is not None and V.form is not None}
-    if protocol.gain_cap is not None or not known:
+    if begin.agents.cap is not None or not known:
         return ()
-    numbers = (protocol.gains, matrix.coupling, matrix.W, matrix.rate, matrix.points)
-    agents = Agents(protocol.order, len(states[0]), protocol.plant, protocol.own, None, protocol.gain.exact, *numbers)
-    nodes, found = range(structure.graph.n_nodes), list[Values]()
+    graph, nodes, found = begin.graph, range(begin.graph.n), list[Values]()
     with suppress(WorkError), limited(WORK):
-        begin = Begin(agents, _checked(structure), states, protocol.offsets)
-        read = {k: _read(V) for k, V in known.items()}
-        graph, deviations = begin.graph, {k: V.deviation.agents for k, V in known.items() if V.deviation is not None}
-        for at in islice(halvings(agents, graph.laplacian_product, graph.unit, states, protocol.offsets), INSTANTS):
+        read = {k: checked_function(V) for k, V in known.items()}
+        deviations = {k: V.deviation.agents for k, V in known.items() if V.deviation is not None}
+        instants = halvings(begin.agents, graph.laplacian_product, graph.unit, begin.states, begin.offsets)
+        for at in islice(instants, INSTANTS):
             values = {k: rounded(value_above(begin, V, at), BITS, up=True) for k, V in read.items()}
             best = {min(known, key=lambda k: deviations[k][v] * values[k]) for v in nodes}
             found.append(tuple(values[k] if k in best else None for k in range(len(functions))))
@@ -73,10 +61,10 @@ def instant_roots(
     known = {k: V for k, V in enumerate(functions) if V.deviation is not None and V.form is not None}
     if not known:
         return ()
-    agents = Cascade(2, len(states[0]), protocol.plant, protocol.own, None, protocol.gain.exact)
+    agents = checked_agents(protocol)
     nodes, found, remaining = range(structure.graph.n_nodes), list[Values](), Fraction(1)
     with suppress(WorkError), limited(WORK):
-        graph, read = _checked(structure), {k: _read(V) for k, V in known.items()}
+        graph, read = checked_graph(structure), {k: checked_function(V) for k, V in known.items()}
         deviations = {k: V.deviation.agents for k, V in known.items() if V.deviation is not None}
         for at in islice(halvings_of(graph, agents, states, protocol.offsets), INSTANTS):
             remaining /= 2
@@ -85,16 +73,3 @@ def instant_roots(
             told = [roots[k] if k in best else (None, None) for k in range(len(functions))]
             found.append(tuple(None if x is None else rounded(x, BITS, up=True) for pair in told for x in pair))
     return tuple(found)
-
-
-def _read(V: LyapunovFunction) -> Function:
-    """Return a Lyapunov function as the check reads it, without its constants."""
-    return Function("", V.proved_rate, Fraction(1), V.form, None, None)
-
-
-def _checked(structure: Structure) -> Digraph:
-    """Return a graph as the check reads it."""
-    rows = structure.graph.exact_rows(range(structure.graph.n_nodes))
-    edges = [(s, t, -row[s]) for t, row in enumerate(rows) for s in sorted(row) if s != t]
-    source, target, weights = zip(*edges, strict=True) if edges else ((), (), ())
-    return Digraph(structure.graph.labels, source, target, weights, 1)
