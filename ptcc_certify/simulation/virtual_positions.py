@@ -191,7 +191,7 @@ def follow(run: Trajectory, protocol: TrackingProtocol, v0: Sequence[Fraction]) 
     if run.targets is not None:  # leaders that move as they like send their own positions
         leading = run.graph.in_weight() == 0
         x[leading], u[leading] = z[leading], 0.0
-    return replace(run, states=x, held_input=u, vehicles=True)
+    return replace(run, states=x, held_input=u, conditions=replace(run.conditions, tracking=protocol))
 
 
 def run_of_vehicles(
