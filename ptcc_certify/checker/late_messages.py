@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from math import ceil
 from typing import Literal
 
@@ -82,6 +83,7 @@ class Messages:
         """Return the latency of an edge, by its place among all."""
         return self.latency[edge if len(self.latency) > 1 else 0]
 
+    @cached_property
     def parts(self) -> Sequence[int]:
         """Return the age of what is heard over each edge, at most, in 64ths of the largest one; one for all edges.
 

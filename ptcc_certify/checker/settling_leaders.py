@@ -71,9 +71,9 @@ def check_settling(
     own = [values[v] for v in followers.nodes]
     need(min(own) > 0, "u of a follower is not positive")
     followers.starts_within(own, scale)
-    followers.need_decay(values, q, b, messages.parts())
+    followers.need_decay(values, q, b, messages.parts)
     if inputs is not None:
-        inputs.by_settling(structure.graph, set(structure.followers), u, b, cap)
+        inputs.by_settling(structure, u, b, cap)
     doc.done(f"b = {down(b)}, q = {down(q)}")
 
 
