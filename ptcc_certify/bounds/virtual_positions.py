@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,6 +27,9 @@ from ptcc_certify.checker.virtual_positions import VehiclesSection, coefficients
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.lyapunov.follower_rows import FollowerRows
+
+if TYPE_CHECKING:
+    from ptcc_certify.bounds.delay.late_messages import LateBounds
 
 #: How many times faster vehicles track than the virtual states decay.
 FASTER = 2
@@ -58,7 +61,7 @@ class VehicleBounds:
     velocity: np.ndarray | None
     input: np.ndarray | None
 
-    def over_time(self, late: Any, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def over_time(self, late: LateBounds, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return what bounds positions and velocities of all agents at instants up to ``T``, ``(N, M)`` floats."""
         chosen, a1 = late.followers, float(self.a1)
         speed = np.array([float(abs(x)) for x in self.v0])[:, None]
@@ -84,21 +87,21 @@ class VehicleBounds:
             position[others] = velocity[others] = 0
         return position, velocity
 
-    def after(self, late: Any) -> float | None:
+    def after(self, late: LateBounds) -> float | None:
         """Return what bounds ``|x_k - x*_k|`` from ``T`` on under a cap; None where nothing does.
 
         With ``C <= after`` at all times ``|x_k - x*_k|`` is at most ``u_k (a_1 M y/(a_1 - b) + floor + after)``, what
         the initial velocity adds, and ``speed/(a_1 g)``, what a vehicle lags behind a target that moves: with ``g =
         g(0)``, or from ``T`` on with the cap if it is less than that at ``T``.
         """
-        cap, speed = late.messages.gain_cap, late.leaders.speed
-        if cap is None:
+        cap, leaders = late.messages.gain_cap, late.leaders
+        if cap is None or leaders is None:
             return None
         messages, at_T = late.case.exact, self.position
-        early, lasting = (float_up(speed / (self.a1 * g)) for g in (messages.least_gain(), cap))
+        early, lasting = (float_up(leaders.speed / (self.a1 * g)) for g in (messages.least_gain(), cap))
         found = []
         for row in filter(self._tracks, late.rows):
-            decay = _decay(late, replace(row, floor=row.floor + row.after), None)
+            decay = _decay(late, replace(row, floor=row.floor + (row.after or 0)), None)
             bound = _meet(late, row, coefficients(messages, decay, self.a1, self.a2)[0], self.v0)
             found += [(bound + early).max(), np.maximum(bound + lasting, at_T).max()]
         return float(min(found)) * _MORE
@@ -108,7 +111,7 @@ class VehicleBounds:
         return row.witness.b < self.a1 and row.witness.b <= self.a2
 
 
-def bound_vehicles(late: Any, rows: FollowerRows) -> Any:
+def bound_vehicles(late: LateBounds, rows: FollowerRows) -> LateBounds:
     """Add what holds of vehicles that track virtual states to LateBounds, in which bounds by rows are proved.
 
     Raises
@@ -149,14 +152,14 @@ def bound_vehicles(late: Any, rows: FollowerRows) -> Any:
     return replace(late, vehicles=VehicleBounds(a, a, vehicles.v0, position, velocity, push))
 
 
-def _decay(late: Any, row: RowBound, drift: Fraction | None) -> Decay:
+def _decay(late: LateBounds, row: RowBound, drift: Fraction | None) -> Decay:
     """Return the decay of a row; ``drift`` is what leaders that move add."""
     highest = row.highest_floor(late.case)
     return Decay(row.witness.b, row.cap, row.left, row.initial, row.floor, drift or Fraction(0), highest)
 
 
 def _meet(
-    late: Any,
+    late: LateBounds,
     row: RowBound,
     terms: Sequence[Fraction],
     v0: Sequence[Fraction],

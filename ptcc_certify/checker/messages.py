@@ -8,7 +8,6 @@ from fractions import Fraction
 from itertools import pairwise
 
 from lmi.exact.decimal_rounding import down, up
-from lmi.exact.elementary_enclosures import log
 from lmi.exact.work import spend
 from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.delay_lmi import LateLMI, check_delay_lmi
@@ -19,7 +18,7 @@ from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.late_drift import drift_above
 from ptcc_certify.checker.late_form import LateForm, check_form
 from ptcc_certify.checker.late_input import Inputs
-from ptcc_certify.checker.late_messages import Delays, Messages, Moving, read_messages
+from ptcc_certify.checker.late_messages import Delays, Messages, Moving, need_left, read_messages
 from ptcc_certify.checker.late_steps import FIXED, Steps, clock_below
 from ptcc_certify.checker.missed_deadline import MissedDeadline, check_missed, check_staged
 from ptcc_certify.checker.proof_cursor import Document
@@ -94,9 +93,8 @@ class Residual:
 
     def __init__(self, doc: Document, followers: Followers, values: Numbers):
         doc.at = "messages.residual"
-        need(all(values.values[v] == 0 for v in followers.others), "a residual of a leader that rests")
         self.stated = Stated("residual", followers.labels, values)
-        self.stated.meet(followers.others)
+        self.stated.rest(followers.others, "a residual of a leader that rests")
 
     def by_rows(self, rows: Rows, decay: Decay) -> None:
         """Mark what is at least as large as this decay leaves it."""
@@ -186,14 +184,7 @@ def _check_rows(
     spend(50, bits, bits, "rows of followers")
     rows = Rows(followers, obligation["witness"].u)
     rows.decay(q, b, messages.parts)
-    need(cap is None or b * cap * messages.delay <= log(q)[0], "b cap delay is above ln q")
-    limit = min((x for x in (cap, messages.gain_cap) if x is not None), default=None)
-    need((limit is None) == (clock is None), "clock is null iff nothing caps the gain")
-    if limit is None or clock is None:
-        need(left == 0, "left is not 0 though the clock goes on for ever")
-    else:
-        need(0 <= clock <= formulas.Limits(limit).clock_below(messages.gain), "the clock does not come so far")
-        need(left >= formulas.decay_above(b * clock), "left is not proved")
+    limit = need_left(messages, q, b, cap, clock, left)
     rows.above_initial(initial)
     rows.above_floor(floor, messages.wrong)
     drift, floor_up_to_T = Fraction(0), floor

@@ -81,6 +81,11 @@ class Stated:
             if common * self.values[v] >= sum(map(mul, own, factors)):
                 self.met[v] = 1
 
+    def rest(self, nodes: Sequence[int], why: str) -> None:
+        """Verify that 0 is stated of agents that rest; ``why`` tells what is the matter otherwise."""
+        need(not any(self.values[v] for v in nodes), why)
+        self.meet(nodes)
+
     def close(self) -> None:
         """Verify that a proof has met the bound of every agent."""
         low = self.met.find(0)

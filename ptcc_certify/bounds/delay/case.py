@@ -122,6 +122,12 @@ class LateCase:
         return self.initial_state is None or self.ends is None
 
     @property
+    def of_whole_graph(self) -> bool:
+        """Whether Lyapunov functions of the whole graph may forgive what is late: under a cap, leaders at rest."""
+        still = self.leaders is None and self.initial_state is not None and not self.messages.value_error
+        return still and self.messages.gain_cap is not None and self.influence is not None and self.influence.exact
+
+    @property
     def state(self) -> Sequence[Fraction]:
         """The initial state, if there is one."""
         assert self.initial_state is not None

@@ -87,6 +87,11 @@ class DelayLMIBounds:
         With a ``gain_cap``, an exact influence, and an initial state.
     """
 
+    @staticmethod
+    def asked(case: LateCase) -> bool:
+        """Tell whether such bounds are asked of a case."""
+        return case.of_whole_graph
+
     def __init__(self, case: LateCase):
         cap, clock = case.messages.gain_cap, case.clock()
         assert case.influence is not None and cap is not None and clock is not None

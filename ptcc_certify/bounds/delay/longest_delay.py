@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,6 @@ from ptcc_certify.bounds.delay.delay_lmi import DelayLMIBounds
 from ptcc_certify.bounds.delay.late_messages import LateBounds, bound_late
 from ptcc_certify.bounds.delay.settling_leaders import SettlingBounds
 from ptcc_certify.bounds.delay.small_delays import SmallDelayBounds
-from ptcc_certify.graphs.structure import Structure
 
 #: Halvings of the interval, in powers of two, and digits of the delay that is returned.
 _HALVINGS, _DIGITS = 9, 3
@@ -38,40 +38,19 @@ def bound_case(case: LateCase) -> LateBounds:
 
 def longest_forgiven(case: LateCase) -> float | None:
     """Return about the longest delay that a function of the whole graph forgives; None where none is asked."""
-    if not _of_whole_graph(case):
-        return None
-    return max(SmallDelayBounds(case).longest_delay() if case.forms else 0.0, DelayLMIBounds(case).longest_delay())
+    asked = [kind(case) for kind in (SmallDelayBounds, DelayLMIBounds) if kind.asked(case)]
+    return max((bounds.longest_delay() for bounds in asked), default=None)
 
 
 def with_forms(late: LateBounds) -> LateBounds:
     """Add what the best Lyapunov functions of the whole graph prove."""
-    late, case = _with_settling(late), late.case
-    if not _of_whole_graph(case):
-        return late
-    if case.forms and (form := (bounds := SmallDelayBounds(case)).best()) is not None:
-        late = replace(late, form=form, input=_least(bounds.inputs(form), late.input))
-    if (found := DelayLMIBounds(case).best()) is not None:
-        late = replace(late, lmi=found[0], input=_least(found[1], late.input))
+    kinds: dict[str, Any] = {"settling": SettlingBounds, "form": SmallDelayBounds, "lmi": DelayLMIBounds}
+    for name, kind in kinds.items():
+        if kind.asked(late.case) and (found := kind(late.case).best()) is not None:
+            bound, inputs = found
+            least = [x for x in (late.input, inputs) if x is not None]
+            late = replace(late, input=np.minimum.reduce(least) if least else None, **{name: bound})
     return late
-
-
-def _of_whole_graph(case: LateCase) -> bool:
-    """Tell whether functions of the whole graph are asked."""
-    of_rest = case.leaders is None and case.initial_state is not None and not case.messages.value_error
-    return of_rest and case.messages.gain_cap is not None and case.influence is not None and case.influence.exact
-
-
-def _with_settling(late: LateBounds) -> LateBounds:
-    """Add what holds of followers that hear late of leaders in groups, unless these hear late, too."""
-    case, structure = late.case, late.structure
-    if case.relative or not case.forms or not case.messages.age or not isinstance(structure, Structure):
-        return late
-    if not case.groups or not structure.followers.size or not case.messages.leaders_hear_at_once(structure):
-        return late
-    bounds = SettlingBounds(case)
-    best = bounds.best()
-    inputs = None if best is None or case.messages.gain_cap is None else bounds.inputs(best)
-    return replace(late, settling=best, input=inputs)
 
 
 def longest_delay(late: LateBounds, residual: Fraction) -> LateBounds | None:
@@ -117,8 +96,3 @@ def bound_at(case: LateCase, age: Fraction) -> LateBounds:
         delay = {edge: Fraction(x) * factor for edge, x in given.items()}
     period = None if messages.period is None else messages.period * factor
     return bound_case(replace(case, messages=replace(messages, delay=delay, period=period)))
-
-
-def _least(one: np.ndarray, other: np.ndarray | None) -> np.ndarray:
-    """Return the smaller bounds of two, of which the second may be missing."""
-    return one if other is None else np.minimum(one, other)

@@ -22,6 +22,7 @@ from lmi.exact.decimal_rounding import float_up
 from lmi.exact.elementary_enclosures import log, rounded
 from ptcc_certify.bounds.delay.case import DecayingForm, LateCase
 from ptcc_certify.checker.input_formulas import BITS, root_above
+from ptcc_certify.graphs.structure import Structure
 
 #: Values of ``q`` that are tried, and the largest one; shares of the largest ``b``.
 _TRIED, _LARGEST_Q, _SHARES = 16, 1e9, (0.3, 0.6, 0.85, 0.97)
@@ -71,6 +72,14 @@ class SettlingBounds:
         With an initial state; leaders hear each other at once.
     """
 
+    @staticmethod
+    def asked(case: LateCase) -> bool:
+        """Tell whether leaders of a case form groups, and settle by themselves."""
+        structure = case.structure
+        if case.relative or not case.forms or not case.messages.age or not isinstance(structure, Structure):
+            return False
+        return bool(case.groups and structure.followers.size) and case.messages.leaders_hear_at_once(structure)
+
     def __init__(self, case: LateCase):
         graph, n = case.graph, case.graph.n_nodes
         self.case, self.followers, self.D = case, case.followers, graph.in_weight()
@@ -80,10 +89,13 @@ class SettlingBounds:
         self.W[graph.target, graph.source] = np.abs(graph.weights)
         self.shares[graph.target, graph.source] = 1 if case.shares is None else case.shares
 
-    def best(self) -> Settling | None:
-        """Return what leaves least at ``T``; None if no function serves."""
+    def best(self) -> tuple[Settling, np.ndarray | None] | None:
+        """Return what leaves least at ``T``, under a cap with bounds of inputs; None if no function serves."""
         found = [bound for one in self.case.forms for bound in self._tried(one)]
-        return min(found, key=lambda bound: float(max(bound.u) * bound.left), default=None)
+        if not found:
+            return None
+        best = min(found, key=lambda bound: float(max(bound.u) * bound.left))
+        return best, None if self.case.messages.gain_cap is None else self.inputs(best)
 
     def inputs(self, bound: Settling) -> np.ndarray:
         """Return what bounds ``|x_k'|`` up to ``T`` under a capped gain, ``(N,)`` floats from above."""

@@ -63,6 +63,11 @@ class SmallDelayBounds:
         With a ``gain_cap``, an exact influence, and an initial state.
     """
 
+    @staticmethod
+    def asked(case: LateCase) -> bool:
+        """Tell whether such bounds are asked of a case."""
+        return case.of_whole_graph and bool(case.forms)
+
     def __init__(self, case: LateCase):
         n, own, cap = case.graph.n_nodes, case.messages.own_delay, case.messages.gain_cap
         assert case.influence is not None and cap is not None
@@ -71,10 +76,13 @@ class SmallDelayBounds:
         self._B = np.array([[float(row.get(v, 0)) for v in range(n)] for row in self.B])
         self._L = np.array([[float(row.get(v, 0)) for v in range(n)] for row in case.rows])
 
-    def best(self) -> SmallDelays | None:
-        """Return what leaves least at ``T``; None if no function forgives this delay."""
-        found = [one for one in map(self.bound, self.case.forms) if one is not None]
-        return min(found, key=lambda one: max(one.residual), default=None)
+    def best(self) -> tuple[SmallDelays, np.ndarray] | None:
+        """Return what leaves least at ``T``, with bounds of inputs; None if no function forgives this delay."""
+        found = [(bound, one) for one in self.case.forms if (bound := self.bound(one)) is not None]
+        if not found:
+            return None
+        bound, one = min(found, key=lambda pair: max(pair[0].residual))
+        return bound, self.inputs(one, bound)
 
     def longest_delay(self) -> float:
         """Return the longest delay that some function forgives, about: this certificate's limit, not the loop's."""
@@ -111,9 +119,8 @@ class SmallDelayBounds:
             residual.append(rounded(moved[-1] + root_above(c * (1 + Fraction(_MORE))) * root * left, BITS, up=True))
         return SmallDelays(one.function, q, b, kap, tuple(exact), left, tuple(moved), tuple(residual))
 
-    def inputs(self, bound: SmallDelays) -> np.ndarray:
+    def inputs(self, one: DecayingForm, bound: SmallDelays) -> np.ndarray:
         """Return what bounds ``|x_k'| <= g phi_k sqrt(V(0)) e^(-b s)`` up to ``T``, ``(N,)`` floats from above."""
-        one = next(one for one in self.case.forms if one.function == bound.function)
         y = self._root(one) * self.case.highest(bound.b)
         return np.array([float_up(x * y) for x in bound.phi]) * (1 + _MORE) + 1e-300
 
