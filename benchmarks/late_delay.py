@@ -23,6 +23,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from late_certificates import grouped_graph, led_graph
 
+from ptcc_certify.bounds.delay.case import LateCase
 from ptcc_certify.bounds.delay.delay_lmi import DelayLMIBounds
 from ptcc_certify.bounds.delay.late_messages import LateBounds, bound_late
 from ptcc_certify.bounds.delay.small_delays import SmallDelayBounds, delay_threshold
@@ -69,7 +70,7 @@ def shares(seed: int) -> tuple[float, float, bool] | None:
 
     def proved(residuals: Callable[[LateBounds], list[np.ndarray]]) -> Callable[[Fraction], float]:
         def left(delay: Fraction) -> float:
-            each = residuals(bound_late(structure, protocol, LateMessages(delay=delay), x0, found.intervals))
+            each = residuals(bound_late(LateCase(structure, protocol, LateMessages(delay=delay), x0, found.intervals)))
             return float(np.min(each, axis=0).max()) if each else math.inf
 
         return left
@@ -90,10 +91,10 @@ def whole_shares(seed: int) -> tuple[float, float]:
     protocol = NominalProtocol(T=1, rho1=1, rho2=3, kappa=1)
     messages = LateMessages("0.001", own_delay=True, gain_cap=20)
     cert = certify(graph, protocol, x0, asks=Asks(simulation=False))
-    asked = cert.structure, protocol.gain, messages, cert.influence, x0
-    by_functions = SmallDelayBounds(*asked).longest_delay(cert.decaying_forms)
+    case = LateCase(cert.structure, protocol, messages, x0, influence=cert.influence, forms=cert.decaying_forms)
+    by_functions = SmallDelayBounds(case).longest_delay()
     does = delay_threshold(cert.structure, 20)
-    return by_functions / does, DelayLMIBounds(*asked).longest_delay() / does
+    return by_functions / does, DelayLMIBounds(case).longest_delay() / does
 
 
 def main() -> None:

@@ -14,21 +14,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_up, up
+from ptcc_certify.bounds.delay.decay_by_rows import RowBound
 from ptcc_certify.bounds.float_conversion import floats_up
-from ptcc_certify.bounds.tracking import drift_integral
-from ptcc_certify.checker.input_formulas import PrescribedGain
-from ptcc_certify.checker.late_messages import Messages, Moving
 from ptcc_certify.checker.side_files import Numbers
-from ptcc_certify.checker.virtual_positions import Decay, VehiclesSection, coefficients
+from ptcc_certify.checker.stated_bounds import Decay
+from ptcc_certify.checker.virtual_positions import VehiclesSection, coefficients
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.lyapunov.follower_rows import FollowerRows
-from ptcc_certify.model.gain_limits import GainLimits
+
+if TYPE_CHECKING:
+    from ptcc_certify.bounds.delay.late_messages import LateBounds
 
 #: How many times faster vehicles track than the virtual states decay.
 FASTER = 2
@@ -60,27 +61,21 @@ class VehicleBounds:
     velocity: np.ndarray | None
     input: np.ndarray | None
 
-    def over_time(self, late: Any, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def over_time(self, late: LateBounds, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return what bounds positions and velocities of all agents at instants up to ``T``, ``(N, M)`` floats."""
         chosen, a1 = late.followers, float(self.a1)
         speed = np.array([float(abs(x)) for x in self.v0])[:, None]
         with np.errstate(divide="ignore"):  # without a cap the gain is infinite at T
             g = late.gain.value(t)
-        first = float(_messages(late).least_gain())
+        first = float(late.case.exact.least_gain())
         position, velocity = (np.full((speed.size, len(t)), np.inf) for _ in range(2))
         for row in late.rows:
-            b = float(row.witness.b)
-            if row.witness.b >= self.a1 or row.witness.b > self.a2:
+            if not self._tracks(row):
                 continue
-            caps = [x for x in (row.cap, late.messages.gain_cap) if x is not None]
-            y = np.exp(-b * GainLimits(gain_cap=min(caps, default=None)).limit(late.gain.gain).clock(t))
-            C = np.zeros(t.shape)
-            if late.leaders is not None:
-                push = float(late.leaders.total) / float(row.witness.u.min())
-                C = push * drift_integral(late.gain.gain, b, min(caps, default=None), t)
+            (y, added), b = row.decay(late.case, t), float(row.witness.b)
             u, lag, floor = np.zeros((speed.size, 1)), 1 / (a1 - b), float(row.floor)
             u[chosen, 0] = row.witness.u
-            decaying = float(row.initial) * y + C
+            decaying = float(row.initial) * y + added
             own = u * (a1 * lag * decaying + floor) + speed * lag / first * y
             ahead = u * (decaying + floor) + speed / (a1 * first) * y
             least = np.where(decaying + floor > 0, _LEAST, 0.0)
@@ -92,31 +87,31 @@ class VehicleBounds:
             position[others] = velocity[others] = 0
         return position, velocity
 
-    def after(self, late: Any) -> float | None:
+    def after(self, late: LateBounds) -> float | None:
         """Return what bounds ``|x_k - x*_k|`` from ``T`` on under a cap; None where nothing does.
 
         With ``C <= after`` at all times ``|x_k - x*_k|`` is at most ``u_k (a_1 M y/(a_1 - b) + floor + after)``, what
         the initial velocity adds, and ``speed/(a_1 g)``, what a vehicle lags behind a target that moves: with ``g =
         g(0)``, or from ``T`` on with the cap if it is less than that at ``T``.
         """
-        cap, speed = late.messages.gain_cap, late.leaders.speed
-        if cap is None:
+        cap, leaders = late.messages.gain_cap, late.leaders
+        if cap is None or leaders is None:
             return None
-        messages, at_T = _messages(late), self.position
-        early, lasting = (float_up(speed / (self.a1 * g)) for g in (messages.least_gain(), cap))
+        messages, at_T = late.case.exact, self.position
+        early, lasting = (float_up(leaders.speed / (self.a1 * g)) for g in (messages.least_gain(), cap))
         found = []
-        for row in late.rows:
-            if row.witness.b >= self.a1 or row.witness.b > self.a2:
-                continue
-            terms = coefficients(
-                messages, _decay(late, replace(row, floor=row.floor + row.after), None), self.a1, self.a2
-            )
-            bound = _meet(late, row, terms[0], self.v0)
+        for row in filter(self._tracks, late.rows):
+            decay = _decay(late, replace(row, floor=row.floor + (row.after or 0)), None)
+            bound = _meet(late, row, coefficients(messages, decay, self.a1, self.a2)[0], self.v0)
             found += [(bound + early).max(), np.maximum(bound + lasting, at_T).max()]
         return float(min(found)) * _MORE
 
+    def _tracks(self, row: RowBound) -> bool:
+        """Tell whether vehicles track faster than virtual positions decay."""
+        return row.witness.b < self.a1 and row.witness.b <= self.a2
 
-def bound_vehicles(late: Any, rows: FollowerRows) -> Any:
+
+def bound_vehicles(late: LateBounds, rows: FollowerRows) -> LateBounds:
     """Add what holds of vehicles that track virtual states to LateBounds, in which bounds by rows are proved.
 
     Raises
@@ -126,12 +121,13 @@ def bound_vehicles(late: Any, rows: FollowerRows) -> Any:
 
     Examples
     --------
+    >>> from ptcc_certify.bounds.delay.case import LateCase
     >>> from ptcc_certify.bounds.delay.late_messages import bound_late
     >>> from ptcc_certify.model.virtual_positions import Vehicles
     >>> structure = analyse(SignedDigraph.from_edges([(1, 2, 1)]))
     >>> messages = LateMessages(gain_cap=9, vehicles=Vehicles((Fraction(0), Fraction(1))))
     >>> ends = [(Fraction(1), Fraction(0))] * 2
-    >>> bounds = bound_late(structure, NominalProtocol(rho2=4), messages, [Fraction(1), Fraction(3)], ends)
+    >>> bounds = bound_late(LateCase(structure, NominalProtocol(rho2=4), messages, [Fraction(1), Fraction(3)], ends))
     >>> bounds.vehicles.position.max() < 0.01, bounds.vehicles.velocity.max() < 100
     (np.True_, np.True_)
     """
@@ -149,32 +145,22 @@ def bound_vehicles(late: Any, rows: FollowerRows) -> Any:
     each = []
     for row in late.rows:
         weights = rows.largest(row.witness.u), rows.weights
-        terms = coefficients(_messages(late), _decay(late, row, row.drift), a, a)
+        terms = coefficients(late.case.exact, _decay(late, row, row.drift), a, a)
         each.append([_meet(late, row, one, vehicles.v0, *weights) for one in terms])
     position, *capped = (np.minimum.reduce(bounds) for bounds in zip(*each, strict=True))
     velocity, push = capped or (None, None)
     return replace(late, vehicles=VehicleBounds(a, a, vehicles.v0, position, velocity, push))
 
 
-def _messages(late: Any) -> Messages:
-    """Return what the formulas of the check know of the messages."""
-    gain, told, leaders = late.gain.gain.exact, late.messages, late.leaders
-    moving = None if leaders is None else Moving(speed=leaders.speed, disturbance=leaders.disturbance)
-    exact = PrescribedGain(gain.T, gain.rho1, gain.k)
-    return Messages(exact, Numbers([Fraction(0)]), told.age, False, told.value_error, told.gain_cap, moving)
-
-
-def _decay(late: Any, row: Any, drift: Fraction | None) -> Decay:
+def _decay(late: LateBounds, row: RowBound, drift: Fraction | None) -> Decay:
     """Return the decay of a row; ``drift`` is what leaders that move add."""
-    highest, messages = row.floor, _messages(late)
-    if row.after is not None:
-        highest += row.after * messages.least_gain(always=True) / messages.least_gain()
+    highest = row.highest_floor(late.case)
     return Decay(row.witness.b, row.cap, row.left, row.initial, row.floor, drift or Fraction(0), highest)
 
 
 def _meet(
-    late: Any,
-    row: Any,
+    late: LateBounds,
+    row: RowBound,
     terms: Sequence[Fraction],
     v0: Sequence[Fraction],
     pulled: np.ndarray | float = 0.0,

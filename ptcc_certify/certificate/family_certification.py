@@ -17,6 +17,7 @@ from lmi import search_time as deadline
 from lmi.errors import NoCertificate
 from lmi.exact.decimal_rounding import counted
 from lmi.search_time import share_of_time
+from ptcc_certify.bounds.delay.case import LateCase
 from ptcc_certify.bounds.delay.late_messages import bound_late
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.bounds.final_state.attracting_box import AttractingBox, box_of_family
@@ -146,7 +147,7 @@ def _beside(proof: FamilyProof) -> dict[str, Any]:
     middles = [((low + high) / 2, (high - low) / 2) for low, high in known]
     ends = middles if len(known) == proof.family.n_nodes else None
     if messages is not None:
-        return {"late": bound_late(proof.family, proof.protocol, messages, state, ends, leaders)}
+        return {"late": bound_late(LateCase(proof.family, proof.protocol, messages, state, ends, leaders))}
     with suppress(NoCertificate):
         assert leaders is not None
         return {"tracking": bound_tracking(proof.family, proof.protocol, leaders, state, ends)}

@@ -15,8 +15,9 @@ from lmi import search_time as deadline
 from lmi.child_process import apart
 from lmi.errors import LMIError, NoCertificate, OutOfTime
 from lmi.search_time import share_of_time
+from ptcc_certify.bounds.delay.case import LateCase
 from ptcc_certify.bounds.delay.late_messages import LateBounds, bound_late
-from ptcc_certify.bounds.delay.longest_delay import LateCase
+from ptcc_certify.bounds.delay.longest_delay import longest_delay, longest_forgiven, with_forms
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.bounds.final_state.enclosed_ends import Interval
 from ptcc_certify.bounds.final_state.of_graph import (
@@ -111,28 +112,21 @@ def with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: b
 
 def with_small_delays(certificate: Certificate) -> Certificate:
     """Add what Lyapunov functions of the whole graph prove with late messages, and the longest delay that was asked."""
-    late, final = certificate.proof.late, certificate.graph_proof.final_state
+    late = certificate.proof.late
     if late is None or late.messages.vehicles is not None:
         return certificate
-    case = LateCase(
-        certificate.graph_proof.structure,
-        certificate.protocol,
-        certificate.initial_state,
-        stated_ends(certificate.graph_proof.influence, final, certificate.initial_state),
-        certificate.graph_proof.influence,
-        certificate.graph_proof.decaying_forms,
-        late.leaders,
-    )
-    late = replace(case.with_forms(late), longest_delay=case.longest_forgiven(late.messages))
+    proof = certificate.graph_proof
+    case = replace(late.case, influence=proof.influence, forms=proof.decaying_forms)
+    late = replace(with_forms(replace(late, case=case)), longest_delay=longest_forgiven(case))
     certificate, asked = certificate.changed(late=late), certificate.expectations.max_residual
     if asked is not None and late.messages.age and certificate.graph_proof.graph.n_nodes <= EXACT_NODES:
-        certificate = certificate.changed(late=replace(late, enough=_longest_delay(certificate, case, late, asked)))
+        certificate = certificate.changed(late=replace(late, enough=_longest_delay(certificate, late, asked)))
     return certificate
 
 
-def _longest_delay(certificate: Certificate, case: LateCase, late: LateBounds, asked: Fraction) -> Fraction | None:
+def _longest_delay(certificate: Certificate, late: LateBounds, asked: Fraction) -> Fraction | None:
     """Return nearly the longest delay that leaves so little, if the check accepts what a certificate states of it."""
-    longest = case.longest(late, asked)
+    longest = longest_delay(late, asked)
     if longest is None or longest is late:
         return None if longest is None else late.messages.age
     return None if rejects(certificate.changed(late=longest).checked) else longest.messages.age
@@ -321,7 +315,8 @@ class GraphSteps(OfQuestion):
                     " out",
                 )
             )
-        return bound_late(self.structure, self.protocol, messages, self.initial_state, ends, self.request.leaders)
+        leaders = self.request.leaders
+        return bound_late(LateCase(self.structure, self.protocol, messages, self.initial_state, ends, leaders))
 
     def tracking(self, ends: Sequence[Interval] | None) -> Tracking | None:
         """Bound how followers track leaders that move; None if nothing is asked of that, or messages are late."""

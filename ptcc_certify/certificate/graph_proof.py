@@ -13,8 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
+from ptcc_certify.bounds.delay.case import DecayingForm
 from ptcc_certify.bounds.delay.late_messages import late_obligations
-from ptcc_certify.bounds.delay.small_delays import DecayingForm
 from ptcc_certify.bounds.deviation.from_final_state import DeviationGeometry
 from ptcc_certify.bounds.envelope import Envelope
 from ptcc_certify.bounds.final_state.enclosed_ends import final_state_witness
@@ -340,8 +340,7 @@ class GraphProof(Proof):
             self.protocol,
             self.forms,
             () if self.initial_state is None and self.initial_set is None else self.full_constants,
-            rate=self.rate,
-            limit=self.upper_bound,
+            rates=(self.rate, self.upper_bound),
             initial_state=self.initial_state,
             initial_set=self.initial_set,
             sigma0=self.sigma0,

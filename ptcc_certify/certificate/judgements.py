@@ -207,7 +207,7 @@ def at_deadline(proof: GraphProof | FamilyProof, answer: Answer) -> Answer:
         return answer
     if late.missed is not None:
         return Answer(REFUTED, what, _misses(late, late.missed))
-    if late.staged is not None:
+    if late.staged:
         return Answer(OPEN, what, "with deadlines of stages it holds, with one for all none is proved to hold it")
     if late.leaders is not None:
         return Answer(OPEN, what, "leaders move, so that nobody is proved to settle")

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ptcc_certify.bounds.delay.case import LateCase
 from ptcc_certify.bounds.delay.late_messages import LateBounds, delays, read_messages
 from ptcc_certify.bounds.envelope import FRACTIONS, LAST_INSTANTS
 from ptcc_certify.bounds.input.effort import LIMITS
@@ -33,7 +34,6 @@ from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound, Membe
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.search import METHODS
 from ptcc_certify.model.base import Protocol
-from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.theorems.counterexample_text import mode_name
@@ -162,8 +162,7 @@ def nothing_proved(
     """
     if messages is None:
         return None
-    gain = GainLimits(gain_cap=messages.gain_cap).limit(protocol.gain)
-    return LateBounds(messages, structure, gain, relative, leaders=leaders)
+    return LateBounds(LateCase(structure, protocol, messages, leaders=leaders), relative)
 
 
 def write_unverified(certificate: Evidence) -> dict[str, Any]:

@@ -247,7 +247,7 @@ def loop_of(messages: Messages, verified: Verified, cap: Fraction) -> LateLoop:
     """Return what is late."""
     structure, final, graph = verified.structure, verified.final, verified.structure.graph
     need_rows(graph.n)
-    rows, parts = [graph.row(v) for v in range(graph.n)], messages.parts()
+    rows, parts = [graph.row(v) for v in range(graph.n)], messages.parts
     edges = [(s, t, -rows[t][s]) for s, t in zip(graph.source, graph.target, strict=True)]
     lateness = [cap * messages.delay * Fraction(x, PARTS) for x in parts]
     lateness *= graph.n_edges if len(parts) == 1 else 1

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
+from operator import mul
 
 from lmi.exact.decimal_rounding import up
-from lmi.exact.numbers import longest, shorten
-from lmi.exact.work import spend
-from ptcc_certify.checker.digraph import Digraph
+from lmi.exact.numbers import integers
 from ptcc_certify.checker.input_formulas import PrescribedGain, decay_above
 from ptcc_certify.checker.late_messages import Messages
 from ptcc_certify.checker.late_steps import clock_below
@@ -16,6 +15,8 @@ from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, need
 from ptcc_certify.checker.rows import Rows
 from ptcc_certify.checker.side_files import Numbers
+from ptcc_certify.checker.stated_bounds import Decay, Stated
+from ptcc_certify.checker.structure import Structure
 
 
 def gain_above(gain: PrescribedGain, gain_cap: Fraction, b: Fraction, cap: Fraction | None = None) -> Fraction:
@@ -42,7 +43,7 @@ def gain_above(gain: PrescribedGain, gain_cap: Fraction, b: Fraction, cap: Fract
 
 
 class Inputs:
-    """What is stated of ``|u_k|`` up to the deadline by agent, and which of it was met by a bound.
+    """What is stated of ``|u_k|`` up to the deadline by agent.
 
     Parameters
     ----------
@@ -61,58 +62,47 @@ class Inputs:
         doc.at = "messages.input"
         if messages.gain_cap is None:
             raise RejectedError("input without a cap of the gain")
-        self.labels, self.messages, self.gain_cap = doc.context.labels, messages, messages.gain_cap
-        self.values, self.scale = values.over(range(len(self.labels)))
-        need(min(self.values) >= 0, "an input is negative")
-        self.met = bytearray(len(self.labels))
+        self.messages, self.gain_cap = messages, messages.gain_cap
+        self.stated = Stated("input", doc.context.labels, values)
+        need(min(self.stated.values) >= 0, "an input is negative")
 
-    def by_rows(self, rows: Rows, b: Fraction, cap: Fraction | None, initial: Fraction, floor: Fraction) -> None:
-        """Mark what is at least ``(2 D_k - b) u_k initial y + gain_cap (floor (D_k u_k + heard_k) + error D_k)``.
+    def by_rows(self, rows: Rows, decay: Decay) -> None:
+        """Mark what is at least ``(2 D_k - b) u_k initial y + gain_cap (highest (D_k u_k + heard_k) + error D_k)``.
 
         Since ``heard_k <= (D_k - b) u_k``, of any weights. Where these are uncertain, the largest are taken.
         """
-        followers = rows.followers
+        followers, b = rows.followers, decay.b
         (most, unit), (degrees, _) = rows.largest, followers.degrees
-        y = initial * gain_above(self.messages.gain, self.gain_cap, b, cap)
-        each, error = self.gain_cap * floor, self.gain_cap * self.messages.wrong
-        factors = [x * self.scale / (rows.scale * unit) for x in (2 * y, y * b * unit, each, error * rows.scale)]
-        bits = longest(n for x in factors for n in x.as_integer_ratio())
-        long = longest(rows.u) + longest(most)
-        spend(8 * len(rows.u), 4 * bits, long + longest(self.values), "inputs of followers")
-        common = 1
-        for x in factors:
-            common *= x.denominator
-        twice, less, steady, wrong = (int(x * common) for x in factors)
-        for v, u, D, total in zip(followers.nodes, rows.u, degrees, most, strict=True):
-            if common * self.values[v] >= D * u * twice - u * less + total * steady + D * wrong:
-                self.met[v] = 1
-        for v in followers.others:  # leaders that rest
-            self.met[v] = 1
+        y = decay.initial * gain_above(self.messages.gain, self.gain_cap, b, decay.cap) / rows.scale
+        self.stated.meet(
+            followers.nodes,
+            (2 * y / unit, list(map(mul, degrees, rows.u))),
+            (-b * y, rows.u),
+            (self.gain_cap * decay.highest / (rows.scale * unit), most),
+            (self.gain_cap * self.messages.wrong / unit, degrees),
+        )
+        self.stated.meet(followers.others)  # leaders that rest
 
-    def by_settling(self, graph: Digraph, followers: Container[int], u: Numbers, b: Fraction, cap: Fraction) -> None:
+    def by_settling(self, structure: Structure, u: Numbers, b: Fraction, cap: Fraction) -> None:
         """Mark what is at least ``(2 D_k - b) u_k y`` of followers, ``(D_l u_l + heard_l) y`` of leaders."""
-        y = gain_above(self.messages.gain, self.gain_cap, b, cap)
+        graph = structure.graph
         values, scale = u.over(range(graph.n))
-        heard, bits = graph.sums_in(values), longest(n for x in (y, b) for n in x.as_integer_ratio())
-        spend(8 * graph.n, 4 * bits, longest(values) + graph.bits + longest(self.values), "inputs of agents")
-        for v, (x, D, h) in enumerate(zip(values, graph.diagonal, heard, strict=True)):
-            most = (2 * D - b * graph.unit) * x if v in followers else Fraction(D * x + h)
-            if Fraction(self.values[v], self.scale) >= most * y / (scale * graph.unit):
-                self.met[v] = 1
+        y, heard = gain_above(self.messages.gain, self.gain_cap, b, cap) / scale, graph.sums_in(values)
+        sent = list(map(mul, graph.diagonal, values))
+        of_followers = ([column[v] for v in structure.followers] for column in (sent, values))
+        self.stated.meet(structure.followers, *zip((2 * y / graph.unit, -b * y), of_followers, strict=True))
+        leaders = [v for group in structure.closed for v in group]
+        self.stated.meet(leaders, (y / graph.unit, [sent[v] + heard[v] for v in leaders]))
 
     def by_form(self, phi: Sequence[Fraction], b: Fraction, root: Fraction) -> None:
         """Mark what is at least ``phi_k sqrt(V(0)) y``."""
+        (values,), scale = integers([phi])
         y = root * gain_above(self.messages.gain, self.gain_cap, b)
-        bits = longest(n for x in (y, *phi) for n in x.as_integer_ratio())
-        spend(4 * len(self.values), bits, bits + longest(self.values), "inputs of agents")
-        for v, x in enumerate(phi):
-            if Fraction(self.values[v], self.scale) >= x * y:
-                self.met[v] = 1
+        self.stated.meet(range(len(values)), (y / scale, values))
 
     def close(self, doc: Document) -> None:
         """Verify that a bound meets what is stated of every agent."""
         doc.at = "messages.input"
         doc.open("late-input", "messages.input")
-        low = self.met.find(0)
-        need(low < 0, f"the input of agent {shorten(self.labels[max(low, 0)])} is not proved")
-        doc.done(f"at most {up(Fraction(max(self.values), self.scale))}")
+        self.stated.close()
+        doc.done(f"at most {up(self.stated.largest)}")

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from math import ceil
 from typing import Literal
 
+from lmi.exact.elementary_enclosures import log
 from lmi.exact.numbers import longest
 from lmi.exact.work import spend
-from ptcc_certify.checker.input_formulas import PrescribedGain
+from ptcc_certify.checker.input_formulas import Limits, PrescribedGain, decay_above
 from ptcc_certify.checker.reading import length, need
 from ptcc_certify.checker.sections import EdgeNumbers, NotNegative, Positive
 from ptcc_certify.checker.side_files import Numbers
@@ -82,6 +84,7 @@ class Messages:
         """Return the latency of an edge, by its place among all."""
         return self.latency[edge if len(self.latency) > 1 else 0]
 
+    @cached_property
     def parts(self) -> Sequence[int]:
         """Return the age of what is heard over each edge, at most, in 64ths of the largest one; one for all edges.
 
@@ -98,6 +101,24 @@ class Messages:
         part = {x: ceil(PARTS * (Fraction(x) / (self.latency.scale or 1) + held) / self.delay) for x in distinct}
         each = [part[x] for x in self.latency.values]
         return each if min(each) < PARTS else (PARTS,)
+
+
+def need_left(
+    messages: Messages, q: Fraction, b: Fraction, cap: Fraction | None, clock: Fraction | None, left: Fraction
+) -> Fraction | None:
+    """Verify that ``q`` serves the delay under a cap, how far the clock comes then, and what is left at ``T``.
+
+    Return what caps the clock.
+    """
+    need(cap is None or b * cap * messages.delay <= log(q)[0], "b cap delay is above ln q")
+    limit = min((x for x in (cap, messages.gain_cap) if x is not None), default=None)
+    need((limit is None) == (clock is None), "clock is null iff nothing caps the gain")
+    if limit is None or clock is None:
+        need(left == 0, "left is not 0 though the clock goes on for ever")
+    else:
+        need(0 <= clock <= Limits(limit).clock_below(messages.gain), "the clock does not come so far")
+        need(left >= decay_above(b * clock), "left is not proved")
+    return limit
 
 
 @dataclass(frozen=True, kw_only=True)

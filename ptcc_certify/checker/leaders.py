@@ -6,15 +6,14 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from lmi.exact.decimal_rounding import down
-from lmi.exact.numbers import longest
 from lmi.exact.work import spend
 from ptcc_certify.checker.family import Family
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin, Protocol
 from ptcc_certify.checker.reading import length, need
-from ptcc_certify.checker.rows import Followers, Rows, followers_of
+from ptcc_certify.checker.rows import Rows, followers_of
 from ptcc_certify.checker.sections import Agents, NotNegative
-from ptcc_certify.checker.side_files import Numbers
+from ptcc_certify.checker.stated_bounds import Stated
 from ptcc_certify.checker.structure import Structure
 
 
@@ -63,16 +62,9 @@ def check_leaders(doc: Document, of: Structure | Family, protocol: Protocol, beg
         need(p >= 1 if sign is not None else p > 1, "a rho2 kappa is too small for a bounded input")
         if sign is None:
             most += push / least * (gain.rho1 * gain.T + gain.k) / (p - 1)
-        _inputs(followers, rows, section.input, most, sign or Fraction(0))
+        stated, (heard, unit) = Stated("input", followers.labels, section.input), rows.largest
+        stated.rest(followers.others, "an input of a leader")
+        added = sign or Fraction(0), [1] * len(followers.nodes)
+        stated.meet(followers.nodes, (most / (rows.scale * unit), heard), added)
+        stated.close()
     doc.done(f"a = {down(a)}")
-
-
-def _inputs(followers: Followers, rows: Rows, values: Numbers, most: Fraction, added: Fraction) -> None:
-    """Verify ``input_k >= (D_k u_k + sum_l |w_kl| u_l) most + added``; leaders have none."""
-    need(all(values.values[v] == 0 for v in followers.others), "an input of a leader")
-    (bounds, unit), (inputs, scale) = rows.largest, values.over(followers.nodes)
-    factor = most / (rows.scale * unit)
-    bits = longest((*factor.as_integer_ratio(), *added.as_integer_ratio(), scale))
-    spend(6 * len(inputs), bits + longest(bounds), bits + longest(inputs), "inputs of followers")
-    for k, (x, y) in enumerate(zip(inputs, bounds, strict=True)):
-        need(Fraction(x, scale) >= y * factor + added, f"the input of agent {followers.label(k)} is not proved")

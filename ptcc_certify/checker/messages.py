@@ -8,8 +8,6 @@ from fractions import Fraction
 from itertools import pairwise
 
 from lmi.exact.decimal_rounding import down, up
-from lmi.exact.elementary_enclosures import log
-from lmi.exact.numbers import longest
 from lmi.exact.work import spend
 from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.delay_lmi import LateLMI, check_delay_lmi
@@ -20,7 +18,7 @@ from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.late_drift import drift_above
 from ptcc_certify.checker.late_form import LateForm, check_form
 from ptcc_certify.checker.late_input import Inputs
-from ptcc_certify.checker.late_messages import Delays, Messages, Moving, read_messages
+from ptcc_certify.checker.late_messages import Delays, Messages, Moving, need_left, read_messages
 from ptcc_certify.checker.late_steps import FIXED, Steps, clock_below
 from ptcc_certify.checker.missed_deadline import MissedDeadline, check_missed, check_staged
 from ptcc_certify.checker.proof_cursor import Document
@@ -30,7 +28,8 @@ from ptcc_certify.checker.rows import Followers, Rows, followers_of
 from ptcc_certify.checker.sections import Agents, ByFollower, FollowerNumbers, Positive, Several
 from ptcc_certify.checker.settling_leaders import SettlingSection, check_settling
 from ptcc_certify.checker.side_files import Numbers
-from ptcc_certify.checker.virtual_positions import Decay, Vehicles, VehiclesSection
+from ptcc_certify.checker.stated_bounds import Decay, Stated
+from ptcc_certify.checker.virtual_positions import Vehicles, VehiclesSection
 
 #: Witnesses of rows, and instants of steps, that are read.
 MANY_ROWS, MANY_INSTANTS = 100, 2001
@@ -83,26 +82,30 @@ class MessagesSection(Delays):
 
 
 class Residual:
-    """What is stated of ``|x_k(T) - x*_k|`` by follower, and which of it was met by a bound.
+    """What is stated of ``|x_k(T) - x*_k|`` of followers; leaders rest.
 
     Parameters
     ----------
+    doc : Document
     values : Numbers
-        By follower.
+        By agent.
     """
 
-    def __init__(self, values: Numbers):
-        self.values, self.scale = values.over(range(len(values)))
-        self.met = bytearray(len(values))
+    def __init__(self, doc: Document, followers: Followers, values: Numbers):
+        doc.at = "messages.residual"
+        self.stated = Stated("residual", followers.labels, values)
+        self.stated.rest(followers.others, "a residual of a leader that rests")
 
-    def meet(self, bounds: Sequence[int], factor: Fraction) -> None:
-        """Mark those that are at least ``factor`` times a bound."""
-        p, q = (factor * self.scale).as_integer_ratio()
-        bits = longest((p, q))
-        spend(2 * len(bounds), bits, longest(bounds) + longest(self.values), "bounds of followers")
-        for k, (x, y) in enumerate(zip(self.values, bounds, strict=True)):
-            if q * x >= p * y:
-                self.met[k] = 1
+    def by_rows(self, rows: Rows, decay: Decay) -> None:
+        """Mark what is at least as large as this decay leaves it."""
+        at_T = decay.initial * decay.left + decay.floor + decay.drift
+        self.stated.meet(rows.followers.nodes, (at_T / rows.scale, rows.u))
+
+    def close(self, doc: Document) -> None:
+        """Verify that a bound meets what is stated of every follower."""
+        doc.open("late-residual", "messages.residual")
+        self.stated.close()
+        doc.done(f"at most {up(self.stated.largest)}")
 
 
 def check_messages(doc: Document, of: Verified | Family, protocol: Protocol, begin: Begin) -> None:
@@ -121,8 +124,8 @@ def check_messages(doc: Document, of: Verified | Family, protocol: Protocol, beg
     need(len(section.rows) <= MANY_ROWS, f"more than {MANY_ROWS} witnesses of rows")
     bounded = bool(section.rows) or section.steps is not None
     by_rows = bounded or section.missed is not None or section.staged is not None
-    stated = by_rows or any(x is not None for x in (section.settling, section.form, section.lmi))
-    need(stated, "nothing is stated of late messages")
+    whole = any(x is not None for x in (section.settling, section.form, section.lmi))
+    need(by_rows or whole, "nothing is stated of late messages")
     need(bounded == (section.residual is not None), "a residual is stated iff rows or steps bound it")
     inputs = None if section.input is None else Inputs(doc, messages, section.input)
     vehicles = None
@@ -135,65 +138,38 @@ def check_messages(doc: Document, of: Verified | Family, protocol: Protocol, beg
         )
     if by_rows:
         need(not messages.late, "rows, steps, missed or staged of a late own state")
-        structure = None if isinstance(of, Family) else of.structure
         followers = followers_of(doc, of if isinstance(of, Family) else of.structure, begin)
-        residual = None if section.residual is None else _residual(doc, followers, section.residual)
-        parts = messages.parts()
+        residual = None if section.residual is None else Residual(doc, followers, section.residual)
+        stated = [one for one in (residual, inputs, vehicles) if one is not None]
         for k, entry in enumerate(section.rows):
-            _check_rows(doc, messages, followers, parts, entry, f"messages.rows[{k}]", residual, inputs, vehicles)
-        if structure is not None and section.steps is not None:
-            _check_steps(doc, messages, followers, structure.graph, parts, section.steps.instants, residual)
+            _check_rows(doc, messages, followers, entry, f"messages.rows[{k}]", stated)
+        if isinstance(of, Verified) and section.steps is not None and residual is not None:
+            _check_steps(doc, messages, followers, of.structure.graph, section.steps.instants, residual.stated)
         if residual is not None:
-            _close_residual(doc, followers, residual)
-        if structure is not None and section.missed is not None:
-            check_missed(doc, messages, structure, begin, section.missed)
-        if structure is not None and section.staged is not None:
-            check_staged(doc, messages, structure, section.staged)
+            residual.close(doc)
+        if isinstance(of, Verified) and section.missed is not None:
+            check_missed(doc, messages, of.structure, begin, section.missed)
+        if isinstance(of, Verified) and section.staged is not None:
+            check_staged(doc, messages, of.structure, section.staged)
     if isinstance(of, Verified):
-        _check_whole_graph(doc, messages, of, section, inputs)
-    if inputs is not None:
-        inputs.close(doc)
-    if vehicles is not None:
-        vehicles.close(doc)
-
-
-def _check_whole_graph(
-    doc: Document, messages: Messages, verified: Verified, section: MessagesSection, inputs: Inputs | None
-) -> None:
-    """Verify what is said of all agents of one graph, leaders in groups among them."""
-    if section.settling is not None:
-        check_settling(doc, messages, verified, section.settling, inputs)
-    if section.form is not None:
-        check_form(doc, messages, verified, section.form, inputs)
-    if section.lmi is not None:
-        check_delay_lmi(doc, messages, verified, section.lmi, inputs)
-
-
-def _residual(doc: Document, followers: Followers, values: Numbers) -> Residual:
-    """Return bounds by agent; leaders rest."""
-    doc.at = "messages.residual"
-    need(all(values.values[v] == 0 for v in followers.others), "a residual of a leader that rests")
-    return Residual(Numbers([values.values[v] for v in followers.nodes], values.scale))
-
-
-def _close_residual(doc: Document, followers: Followers, residual: Residual) -> None:
-    """Verify that a bound meets what is stated of every follower."""
-    doc.open("late-residual", "messages.residual")
-    low = residual.met.find(0)
-    need(low < 0, f"the residual of agent {followers.label(max(low, 0))} is not proved")
-    doc.done(f"at most {up(Fraction(max(residual.values), residual.scale))}")
+        if section.settling is not None:
+            check_settling(doc, messages, of, section.settling, inputs)
+        if section.form is not None:
+            check_form(doc, messages, of, section.form, inputs)
+        if section.lmi is not None:
+            check_delay_lmi(doc, messages, of, section.lmi, inputs)
+    for one in (inputs, vehicles):
+        if one is not None:
+            one.close(doc)
 
 
 def _check_rows(
     doc: Document,
     messages: Messages,
     followers: Followers,
-    parts: Sequence[int],
     entry: RowsBound,
     of: str,
-    residual: Residual | None,
-    inputs: Inputs | None,
-    vehicles: Vehicles | None,
+    stated: Sequence[Residual | Inputs | Vehicles],
 ) -> None:
     """Verify ``|x_k - x*_k| <= u_k (initial e^(-b s) + floor)`` by one witness of rows."""
     doc.at = of
@@ -207,27 +183,16 @@ def _check_rows(
     bits = length((q, b, left, clock or left, cap or left, messages.delay, messages.gain.T, messages.gain.rho1))
     spend(50, bits, bits, "rows of followers")
     rows = Rows(followers, obligation["witness"].u)
-    rows.decay(q, b, parts)
-    need(cap is None or b * cap * messages.delay <= log(q)[0], "b cap delay is above ln q")
-    limit = min((x for x in (cap, messages.gain_cap) if x is not None), default=None)
-    need((limit is None) == (clock is None), "clock is null iff nothing caps the gain")
-    if limit is None or clock is None:
-        need(left == 0, "left is not 0 though the clock goes on for ever")
-    else:
-        need(0 <= clock <= formulas.Limits(limit).clock_below(messages.gain), "the clock does not come so far")
-        need(left >= formulas.decay_above(b * clock), "left is not proved")
+    rows.decay(q, b, messages.parts)
+    limit = need_left(messages, q, b, cap, clock, left)
     rows.above_initial(initial)
     rows.above_floor(floor, messages.wrong)
     drift, floor_up_to_T = Fraction(0), floor
     if messages.leaders is not None:
         drift, after = _drift(messages, messages.leaders, rows, b, limit, entry)
         floor_up_to_T += after * messages.least_gain(always=True) / messages.least_gain()
-    if residual is not None:
-        residual.meet(rows.u, (initial * left + floor + drift) / rows.scale)
-    if inputs is not None:
-        inputs.by_rows(rows, b, cap, initial, floor_up_to_T)
-    if vehicles is not None:
-        vehicles.by_rows(rows, Decay(b, cap, left, initial, floor, drift, floor_up_to_T))
+    for one in stated:
+        one.by_rows(rows, Decay(b, cap, left, initial, floor, drift, floor_up_to_T))
     doc.done(f"b = {down(b)}, q = {down(q)}")
 
 
@@ -248,9 +213,8 @@ def _check_steps(
     messages: Messages,
     followers: Followers,
     graph: Digraph,
-    parts: Sequence[int],
     instants: Sequence[Fraction],
-    residual: Residual | None,
+    residual: Stated,
 ) -> None:
     """Verify the start of a solution that never grows, and form its bounds at the deadline."""
     doc.at = "messages.steps"
@@ -273,8 +237,7 @@ def _check_steps(
     kind, degrees = Steps, [graph.diagonal[v] for v in followers.nodes]
     if doc.exact.numpy and graph.n_edges >= MANY_EDGES:
         from ptcc_certify.checker.array_steps import ArraySteps as kind  # noqa: N813
-    steps = kind(graph, followers.nodes, degrees, values, error, parts, push)
+    steps = kind(graph, followers.nodes, degrees, values, error, messages.parts, push)
     bounds = steps.run(instants, messages.delay, ways, gains)
-    if residual is not None:
-        residual.meet(bounds, Fraction(steps.largest, scale << FIXED))
+    residual.meet(followers.nodes, (Fraction(steps.largest, scale << FIXED), bounds))
     doc.done(f"{len(ways)} steps")

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from lmi.exact.decimal_rounding import down
-from lmi.exact.elementary_enclosures import log
 from lmi.exact.numbers import shorten
 from lmi.exact.work import spend
 from ptcc_certify.checker import input_formulas as formulas
@@ -14,7 +13,7 @@ from ptcc_certify.checker.digraph import edges_of
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.late_form import Constants, function_of, initial_value
 from ptcc_certify.checker.late_input import Inputs
-from ptcc_certify.checker.late_messages import Messages
+from ptcc_certify.checker.late_messages import Messages, need_left
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import length, need
 from ptcc_certify.checker.rows import away_of
@@ -61,19 +60,16 @@ def check_settling(
     need(0 < b <= known.form.rate / 2, "b is not positive, or above half the rate of the leaders")
     bits = length((q, b, left, clock, cap, messages.delay, gain.T, gain.rho1, *u, *known.deviations))
     spend(50 + 20 * structure.graph.n, bits, bits, "settling leaders")
-    need(b * cap * messages.delay <= log(q)[0], "b cap delay is above ln q")
-    limit = cap if messages.gain_cap is None else min(cap, messages.gain_cap)
-    need(0 <= clock <= formulas.Limits(limit).clock_below(gain), "the clock does not come so far")
-    need(left >= formulas.decay_above(b * clock), "left is not proved")
+    need_left(messages, q, b, cap, clock, left)
     _above_leaders(verified, known, u)
     followers = away_of(doc, structure, verified.begin)
     values, scale = u.over(range(structure.graph.n))
     own = [values[v] for v in followers.nodes]
     need(min(own) > 0, "u of a follower is not positive")
     followers.starts_within(own, scale)
-    followers.need_decay(values, q, b, messages.parts())
+    followers.need_decay(values, q, b, messages.parts)
     if inputs is not None:
-        inputs.by_settling(structure.graph, set(structure.followers), u, b, cap)
+        inputs.by_settling(structure, u, b, cap)
     doc.done(f"b = {down(b)}, q = {down(q)}")
 
 

@@ -6,13 +6,11 @@ over to the vehicles, which follow ``z_k`` as it is seen through two filters of 
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from operator import mul
 
 from lmi.exact.decimal_rounding import down, up
-from lmi.exact.numbers import longest, shorten
 from lmi.exact.work import spend
 from ptcc_certify.checker.late_input import gain_above
 from ptcc_certify.checker.late_messages import Messages
@@ -20,6 +18,7 @@ from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import length, need
 from ptcc_certify.checker.rows import Rows
 from ptcc_certify.checker.sections import Agents, Positive
+from ptcc_certify.checker.stated_bounds import Decay, Stated
 
 #: Coefficients of ``|v_k(0)|``, of ``u_k``, of ``D_k u_k + sum_l |w_kl| u_l``, of ``D_k u_k`` and of ``D_k``.
 Coefficients = tuple[Fraction, Fraction, Fraction, Fraction, Fraction]
@@ -35,31 +34,6 @@ class VehiclesSection:
     position: Agents
     velocity: Agents | None
     input: Agents | None
-
-
-@dataclass(frozen=True)
-class Decay:
-    """One decay by rows of the virtual states.
-
-    Attributes
-    ----------
-    b : Fraction
-        Its rate.
-    cap : Fraction or None
-        Of its clock.
-    left : Fraction
-        What is left of it at ``T``.
-    initial, floor, drift, highest : Fraction
-        ``initial`` times it, what errors add, what drives add at ``T``, and what both add at most up to ``T``.
-    """
-
-    b: Fraction
-    cap: Fraction | None
-    left: Fraction
-    initial: Fraction
-    floor: Fraction
-    drift: Fraction
-    highest: Fraction
 
 
 def coefficients(messages: Messages, decay: Decay, a1: Fraction, a2: Fraction) -> tuple[Coefficients, ...]:
@@ -116,56 +90,34 @@ class Vehicles:
         capped = messages.gain_cap is not None
         stated = [section.velocity is not None, section.input is not None]
         need(stated == [capped, capped], "velocity and input are stated iff the gain has a cap")
-        lists = (section.position, section.velocity, section.input)
-        everyone = range(len(self.labels))
-        self.stated = [values.over(everyone) for values in lists if values is not None]
-        need(all(min(values) >= 0 for values, _ in self.stated), "a bound is negative")
-        self.begun, self.scale = section.v0.over(everyone)
-        self.met = [bytearray(len(self.labels)) for _ in self.stated]
+        lists = {"position": section.position, "velocity": section.velocity, "input": section.input}
+        self.stated = [Stated(name, self.labels, values) for name, values in lists.items() if values is not None]
+        need(all(min(one.values) >= 0 for one in self.stated), "a bound is negative")
+        self.begun, self.scale = section.v0.over(range(len(self.labels)))
 
     def by_rows(self, rows: Rows, decay: Decay) -> None:
         """Mark what is at least as large as this decay makes it, unless it is too fast for the gains."""
         section, messages, followers = self.section, self.messages, rows.followers
-        others = followers.others
+        begun, others = [abs(v) for v in self.begun], followers.others
         if messages.leaders is not None:
-            need(not any(self.begun[v] for v in others), "an initial velocity of a leader that moves as it likes")
+            need(not any(begun[v] for v in others), "an initial velocity of a leader that moves as it likes")
         bits = length((decay.b, decay.left, decay.initial, decay.floor, decay.highest, section.a1, section.a2))
         spend(100, bits, bits, "bounds of vehicles")
         if decay.b >= section.a1 or decay.b > section.a2:
             return
         (heard, unit), (degrees, _) = rows.largest, followers.degrees
+        pulled = list(map(mul, degrees, rows.u))
+        columns = [[begun[v] for v in followers.nodes], rows.u, heard, pulled, degrees]
         over = self.scale, rows.scale, rows.scale * unit, rows.scale * unit, unit
-        nothing = [0] * len(others)
-        columns = [
-            [abs(self.begun[v]) for v in (*followers.nodes, *others)],
-            [*rows.u, *nothing],
-            [*heard, *nothing],
-            [*(D * u for D, u in zip(degrees, rows.u, strict=True)), *nothing],
-            [*degrees, *nothing],
-        ]
-        nodes = [*followers.nodes, *others]
-        each = coefficients(messages, decay, section.a1, section.a2)
-        for met, (values, scale), row in zip(self.met, self.stated, each, strict=True):
-            _mark(met, nodes, values, [x * scale / own for x, own in zip(row, over, strict=True)], columns)
+        for one, row in zip(self.stated, coefficients(messages, decay, section.a1, section.a2), strict=True):
+            factors = [x / common for x, common in zip(row, over, strict=True)]
+            one.meet(followers.nodes, *zip(factors, columns, strict=True))
+            one.meet(others, (factors[0], [begun[v] for v in others]))
 
     def close(self, doc: Document) -> None:
         """Verify that a decay meets what is stated of every agent."""
         doc.at = "messages.vehicles"
         doc.open("late-vehicles", "messages.vehicles")
-        for name, met in zip(("position", "velocity", "input"), self.met, strict=False):
-            low = met.find(0)
-            need(low < 0, f"the {name} of agent {shorten(self.labels[max(low, 0)])} is not proved")
-        values, scale = self.stated[0]
-        doc.done(f"a_1 = {down(self.section.a1)}, at most {up(Fraction(max(values), scale))}")
-
-
-def _mark(
-    met: bytearray, nodes: Sequence[int], values: Sequence[int], row: Sequence[Fraction], columns: Sequence[list[int]]
-) -> None:
-    """Mark the nodes whose value is at least the sum of the columns, each times its factor."""
-    common = math.lcm(*(x.denominator for x in row))
-    factors = [x.numerator * (common // x.denominator) for x in row]
-    spend(6 * len(nodes), longest((common, *factors)), longest(values) + max(map(longest, columns)), "vehicles")
-    for v, *own in zip(nodes, *columns, strict=True):
-        if common * values[v] >= sum(x * c for x, c in zip(own, factors, strict=True)):
-            met[v] = 1
+        for one in self.stated:
+            one.close()
+        doc.done(f"a_1 = {down(self.section.a1)}, at most {up(self.stated[0].largest)}")

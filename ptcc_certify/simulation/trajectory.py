@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from ptcc_certify.model.gain_limits import GainLimits
     from ptcc_certify.model.late_messages import LateMessages
     from ptcc_certify.model.moving_leaders import MovingLeaders
+    from ptcc_certify.model.virtual_positions import TrackingProtocol
     from ptcc_certify.simulation.cvodes import Tolerances
 
 #: A state at the deadline is settled when its residual is below this multiple of the tolerances.
@@ -246,6 +247,8 @@ class Conditions(ByValue):
         How leaders move.
     places : (N,) array or None
         Those of a formation; then the ``states`` of a run are less these, and tables and figures tell its positions.
+    tracking : TrackingProtocol or None
+        By which the agents are double integrators that track those of another run.
     """
 
     actuator: GainLimits | None = None
@@ -253,6 +256,7 @@ class Conditions(ByValue):
     messages: LateMessages | None = None
     leaders: MovingLeaders | None = None
     places: np.ndarray | None = None
+    tracking: TrackingProtocol | None = None
 
     def __post_init__(self) -> None:
         self.lock()
@@ -290,8 +294,6 @@ class Trajectory(ByAgent, ByValue, Shown):
         What else the run met.
     held_input : (N, M) or (N, S, M) array or None
         The input where it is not that of the states: under zero-order hold, of late messages, of leaders that move.
-    vehicles : bool
-        Whether these are double integrators that track the agents of another run.
     targets : (N, M) array or None
         Where leaders move, ``-L_F^-1 L_FL X_L`` of followers, of leaders their states.
 
@@ -322,7 +324,6 @@ class Trajectory(ByAgent, ByValue, Shown):
     played: Played | None = field(default=None, kw_only=True)
     conditions: Conditions = field(default=Conditions(), kw_only=True)
     held_input: np.ndarray | None = field(default=None, kw_only=True)
-    vehicles: bool = field(default=False, kw_only=True)
     targets: np.ndarray | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
@@ -332,6 +333,11 @@ class Trajectory(ByAgent, ByValue, Shown):
     def rtol(self) -> float:
         """The relative tolerance of the integrator."""
         return self.tolerances.rtol
+
+    @property
+    def vehicles(self) -> bool:
+        """Whether these are double integrators that track the agents of another run."""
+        return self.conditions.tracking is not None
 
     @property
     def signal(self) -> str:

@@ -136,7 +136,7 @@ def _slope(protocol: TrackingProtocol, g: np.ndarray) -> np.ndarray:
 def follow(run: Trajectory, protocol: TrackingProtocol, v0: Sequence[Fraction]) -> Trajectory:
     """Return the run of vehicles that track the agents of a run, with their input; see :func:`follow_in_motion`."""
     x, _, u = _followed(run, protocol, v0)
-    return replace(run, states=x, held_input=u, vehicles=True)
+    return replace(run, states=x, held_input=u, conditions=replace(run.conditions, tracking=protocol))
 
 
 def follow_in_motion(run: Trajectory, protocol: TrackingProtocol, v0: Sequence[Fraction]) -> AgentsTrajectory:

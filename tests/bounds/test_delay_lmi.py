@@ -13,10 +13,12 @@ from late_certificates import grouped_graph
 
 from lmi.exact.decimal_rounding import float_up
 from ptcc_certify import read_certificate
+from ptcc_certify.bounds.delay.case import LateCase
 from ptcc_certify.bounds.delay.delay_lmi import DelayLMIBounds
-from ptcc_certify.bounds.delay.longest_delay import LateCase
+from ptcc_certify.bounds.delay.longest_delay import bound_case, longest_delay
 from ptcc_certify.bounds.delay.small_delays import SmallDelayBounds, delay_threshold
 from ptcc_certify.bounds.final_state.of_graph import influence
+from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.model import NominalProtocol
@@ -31,15 +33,19 @@ TEAM = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -2), (3, 1, -1), (1, 4, 1), (
 def bounds(graph: SignedDigraph, delay: object, own: bool, x0: list[Fraction] | None = None) -> DelayLMIBounds:
     structure, messages = analyse(graph), LateMessages(delay, own_delay=own, gain_cap=CAP)
     start = x0 or [Fraction(k) for k in range(graph.n_nodes)]
-    return DelayLMIBounds(structure, PROTOCOL.gain, messages, influence(structure), start)
+    return DelayLMIBounds(LateCase(structure, PROTOCOL, messages, start, influence=influence(structure)))
+
+
+def small_delays(cert: Certificate, probe: LateMessages) -> SmallDelayBounds:
+    known = cert.initial_state, None, None, cert.influence, cert.decaying_forms
+    return SmallDelayBounds(LateCase(cert.structure, PROTOCOL, probe, *known))
 
 
 @pytest.mark.parametrize("own", [False, True])
 def test_delays_of_a_whole_graph_are_certified_that_are_five_times_as_long_as_those_of_its_functions(own: bool) -> None:
     probe = LateMessages("0.001", own_delay=own, gain_cap=CAP)
     cert = certify_words(TEAM, PROTOCOL, [3, 1, 2, -4, 5], messages=probe, simulation=False)
-    small = SmallDelayBounds(cert.structure, PROTOCOL.gain, probe, cert.influence, cert.initial_state or ())
-    delay = Fraction(f"{5 * small.longest_delay(cert.decaying_forms):.3e}")
+    delay = Fraction(f"{5 * small_delays(cert, probe).longest_delay():.3e}")
     longer = LateMessages(delay, own_delay=own, gain_cap=CAP)
     found = certify_words(TEAM, PROTOCOL, [3, 1, 2, -4, 5], messages=longer, simulation=False)
     assert found.verdict == "certified" and found.checked is not None and found.checked.accepted
@@ -71,9 +77,9 @@ def test_the_longest_delay_for_a_wanted_residual_is_sought_by_it_too() -> None:
     graph, start = analyse(TEAM), [Fraction(k) for k in (3, 1, 2, -4, 5)]
     cert = certify_words(TEAM, PROTOCOL, start, simulation=False)
     ends = None if cert.final_state is None else cert.final_state.intervals
-    case = LateCase(graph, PROTOCOL, cert.initial_state, ends, cert.influence, cert.decaying_forms)
-    late = case.bound(LateMessages("0.0001", own_delay=True, gain_cap=CAP))
-    longest = case.longest(late, Fraction(1))
+    messages, parts = LateMessages("0.0001", own_delay=True, gain_cap=CAP), (cert.influence, cert.decaying_forms)
+    late = bound_case(LateCase(graph, PROTOCOL, messages, cert.initial_state, ends, None, *parts))
+    longest = longest_delay(late, Fraction(1))
     assert longest is not None and longest.lmi is not None and longest.form is None
     assert longest.largest <= 1
 
@@ -99,9 +105,8 @@ def test_of_a_larger_team_the_first_function_is_taken_and_forgives_longer_delays
     graph, x0 = SignedDigraph.from_edges(edges), [k % 7 - 3 for k in range(23)]
     probe = LateMessages("0.001", gain_cap=CAP)
     cert = certify_words(graph, PROTOCOL, x0, messages=probe, simulation=False, method="paper")
-    small = SmallDelayBounds(cert.structure, PROTOCOL.gain, probe, cert.influence, cert.initial_state or ())
     assert cert.late is not None and cert.late.lmi is not None and cert.verdict == "certified"
-    assert (cert.late.longest_delay or 0) > 5 * small.longest_delay(cert.decaying_forms)
+    assert (cert.late.longest_delay or 0) > 5 * small_delays(cert, probe).longest_delay()
 
 
 def test_nothing_is_searched_of_large_graphs() -> None:

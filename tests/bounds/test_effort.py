@@ -387,7 +387,7 @@ def test_every_short_period_is_certified_and_a_longer_one_is_told_which_is():
 
 def decides(graph: SignedDigraph, k: Fraction) -> tuple[bool | None, str | None]:
     """What is decided without any rate."""
-    effort = bound_effort(InputRequest(analyse(graph), NominalProtocol(1, 1, k, 1), [], [], rate=None, limit=None))
+    effort = bound_effort(InputRequest(analyse(graph), NominalProtocol(1, 1, k, 1), [], [], rates=(None, None)))
     return effort.bounded, effort.by
 
 

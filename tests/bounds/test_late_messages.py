@@ -20,9 +20,10 @@ from scipy.linalg import expm
 from selection import thinned
 
 from lmi.errors import NoCertificate
-from ptcc_certify.bounds.delay import late_messages
+from ptcc_certify.bounds.delay import decay_by_rows
+from ptcc_certify.bounds.delay.case import LateCase
 from ptcc_certify.bounds.delay.late_messages import LateBounds, bound_late
-from ptcc_certify.bounds.delay.longest_delay import LateCase
+from ptcc_certify.bounds.delay.longest_delay import bound_at, bound_case, longest_delay
 from ptcc_certify.bounds.delay.small_delays import delay_threshold
 from ptcc_certify.bounds.delay.staged_deadlines import levels
 from ptcc_certify.bounds.final_state.of_graph import final_state
@@ -97,7 +98,7 @@ def _judge_late(seed: int, patterns: tuple[str, ...] = PATTERNS, apart: bool = F
     rng, structure, protocol, x0, ends = _case(seed)
     messages = _messages(rng, protocol, exact=bool(rng.random() < 0.5))
     messages = _apart(rng, structure, messages) if apart else messages
-    bounds = bound_late(structure, protocol, messages, x0, ends.intervals)
+    bounds = bound_late(LateCase(structure, protocol, messages, x0, ends.intervals))
     start = [float(x) for x in x0]
     ratios = []
     for pattern in patterns:
@@ -124,7 +125,7 @@ def test_delays_of_single_edges_leave_no_more_than_the_largest_for_all_and_no_ru
     rng, structure, protocol, x0, ends = _case(seed)
     alike = LateMessages(delay=protocol.T / 20)
     apart = _apart(rng, structure, alike)
-    whole, single = (bound_late(structure, protocol, one, x0, ends.intervals) for one in (alike, apart))
+    whole, single = (bound_late(LateCase(structure, protocol, one, x0, ends.intervals)) for one in (alike, apart))
     assert (single.residual <= whole.residual * 1.02).all()  # type: ignore[operator, union-attr]
     _judge_late(seed, ("oldest", "varying"), apart=True)
 
@@ -133,8 +134,8 @@ def test_messages_of_leaders_at_rest_may_be_as_old_as_they_like() -> None:
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 2), ("c", "b", -1), ("a", "c", 1)])
     structure, protocol = analyse(graph), NominalProtocol(T=1, rho1=1, rho2=4, kappa=1)
     each = {("a", "b"): "0.3", ("a", "c"): "0.3", ("b", "c"): "0.009375", ("c", "b"): "0.009375"}
-    single = bound_late(structure, protocol, LateMessages(delay=each))
-    among = bound_late(structure, protocol, LateMessages(delay="0.009375"))
+    single = bound_late(LateCase(structure, protocol, LateMessages(delay=each)))
+    among = bound_late(LateCase(structure, protocol, LateMessages(delay="0.009375")))
     assert single.largest <= among.largest * 1.05
     cert = certify(graph, protocol, messages=LateMessages(delay=each), asks=Asks(simulation=False, method="paper"))
     assert cert.checked is not None and cert.checked.accepted, cert.checked
@@ -159,7 +160,7 @@ def _judge_settling(seed: int, patterns: tuple[str, ...] = PATTERNS) -> float:
     for pattern in patterns:
         run = simulate_late(graph, protocol, messages, [float(x) for x in x0], pattern=pattern, seed=seed, steps=300)  # type: ignore[arg-type]
         away = np.maximum(np.abs(run.states - end[:, None]) - FLOOR * 10 * float(max(map(abs, x0))), 0)
-        ratios = [away / np.maximum(cert.late.settling.deviation_bound(cert.late.gain, run.t), 1e-300)]
+        ratios = [away / np.maximum(cert.late.settling.deviation_bound(cert.late.case, run.t), 1e-300)]
         ratios.append(away[:, -1] / np.maximum(cert.late.settling.residual, 1e-300))
         ratios += [] if cert.late.input is None else [np.abs(run.input) / cert.late.input[:, None]]
         worst = max(worst, *(float(ratio.max()) for ratio in ratios))
@@ -211,32 +212,32 @@ def test_the_longest_delay_leaves_as_little_as_was_asked_and_a_longer_one_does_n
     rng, structure, protocol, x0, ends = _case(seed)
     messages = _messages(rng, protocol, exact=True)
     messages = _apart(rng, structure, messages) if seed % 2 else messages
-    case = LateCase(structure, protocol, x0, ends.intervals)
-    first = case.bound(messages)
+    first = bound_case(LateCase(structure, protocol, messages, x0, ends.intervals))
     for share in ("0.3", "3"):
         asked = Fraction(first.largest) * Fraction(share)
-        longest = case.longest(first, asked)
+        longest = longest_delay(first, asked)
         if longest is None:
-            assert case._bound_at(messages, protocol.T / 10**5).largest > asked
+            assert bound_at(first.case, protocol.T / 10**5).largest > asked
             continue
         assert longest.largest <= asked
         age, times = longest.messages.age, messages.latencies(structure.graph)
         assert (age < messages.age) == (share == "0.3") or longest is first
         if isinstance(times, tuple):  # all times in proportion
             assert [x * age / messages.age for x in times] == list(longest.messages.latencies(structure.graph))
-        longer = case._bound_at(messages, age * Fraction(11, 10))
+        longer = bound_at(first.case, age * Fraction(11, 10))
         assert longer.largest > asked or age == protocol.T
 
 
 def test_initial_deviations_of_many_followers_are_bounded_from_above_and_nearly_exact(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(late_messages, "SEARCHED_FOLLOWERS", 0)
-    rows = FollowerRows(analyse(SignedDigraph.from_edges([(0, k, 1) for k in range(1, 8)])))
+    monkeypatch.setattr(decay_by_rows, "SEARCHED_FOLLOWERS", 0)
+    star = analyse(SignedDigraph.from_edges([(0, k, 1) for k in range(1, 8)]))
     state = [Fraction(1), *(Fraction(10) ** k / 3 for k in range(-3, 4))]
     ends = [(Fraction(1, 3), Fraction(v, 10**12)) for v in range(8)]
+    case = LateCase(star, NominalProtocol(), LateMessages(1), state, ends)
     exact = [abs(x - mid) + radius for x, (mid, radius) in zip(state, ends, strict=True)][1:]
-    above = [Fraction(float(x)) for x in late_messages._away(rows, state, ends)]
+    above = [Fraction(float(x)) for x in decay_by_rows.away(case, FollowerRows(star))]
     for x, y, size in zip(exact, above, state[1:], strict=True):
         assert x <= y <= x + (size + 1) / 10**14
 
@@ -254,7 +255,7 @@ def _missing(seeds: range) -> Iterator[tuple[Structure, NominalProtocol, list[Fr
     for seed in seeds:
         _, structure, protocol, x0, ends = _case(seed)
         messages = LateMessages(delay=protocol.T / 8)
-        bounds = bound_late(structure, protocol, messages, x0, ends.intervals)
+        bounds = bound_late(LateCase(structure, protocol, messages, x0, ends.intervals))
         if bounds.missed is not None:
             yield structure, protocol, x0, bounds
 
@@ -285,7 +286,7 @@ def test_the_lower_bound_of_what_is_missed_is_kept_on_200_graphs() -> None:
 def test_agents_with_deadlines_one_delay_apart_are_at_their_final_states_exactly(seed: int) -> None:
     _, structure, protocol, x0, ends = _case(seed, acyclic=True)
     messages = LateMessages(delay=protocol.T / 20)
-    bounds = bound_late(structure, protocol, messages, x0, ends.intervals)
+    bounds = bound_late(LateCase(structure, protocol, messages, x0, ends.intervals))
     assert bounds.staged is not None
     assert max(bounds.staged) == protocol.T
     deadlines = [protocol.T] * structure.graph.n_nodes
@@ -326,9 +327,9 @@ def test_one_common_deadline_is_missed_where_deadlines_of_stages_are_met() -> No
     protocol, messages = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1), LateMessages(delay="0.1")
     run = simulate_late(chain.graph, protocol, messages, [1, 0, 0, 0], steps=200)
     assert abs(run.states[2, -1] - 1) > 1e-3
-    late = bound_late(chain, protocol, messages, [Fraction(1), Fraction(0), Fraction(0), Fraction(0)], None)
+    late = bound_late(LateCase(chain, protocol, messages, [Fraction(1), Fraction(0), Fraction(0), Fraction(0)], None))
     assert late.staged == (Fraction(4, 5), Fraction(9, 10), Fraction(1))
-    assert bound_late(chain, protocol, LateMessages(delay="0.5")).staged is None  # information has not arrived
+    assert bound_late(LateCase(chain, protocol, LateMessages(delay="0.5"))).staged == ()  # nothing has arrived
 
 
 @pytest.mark.parametrize("share, grows", [(0.99, False), (1.01, True)])
@@ -383,7 +384,7 @@ def test_a_delay_of_an_edge_that_is_not_there_is_named() -> None:
     pair = analyse(SignedDigraph.from_edges([("a", "b", 1)]))
     protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
     with pytest.raises(ParameterError, match="a delay of b -> a, but the graph has no such edge"):
-        bound_late(pair, protocol, LateMessages(delay={("b", "a"): 1}))
+        bound_late(LateCase(pair, protocol, LateMessages(delay={("b", "a"): 1})))
 
 
 # ---------------------------------------------------------------------- leaders that move
@@ -509,7 +510,8 @@ def _input_bound(seed: int) -> tuple[Structure, NominalProtocol, LateMessages, l
         cert = certify(structure, protocol, x0, messages=messages, asks=Asks(simulation=False, method="paper"))
         assert cert.checked is not None and cert.checked.accepted, cert.notes
         return structure, protocol, messages, x0, None if cert.late is None else cert.late.input
-    return structure, protocol, messages, x0, bound_late(structure, protocol, messages, x0, end.intervals).input
+    inputs = bound_late(LateCase(structure, protocol, messages, x0, end.intervals)).input
+    return structure, protocol, messages, x0, inputs
 
 
 def _largest_share(seeds: Iterator[int] | range) -> list[float]:
@@ -579,7 +581,7 @@ def _flight_ratio(seed: int, pattern: int, apart: bool = False) -> tuple[float, 
     The motion is that of the tests, which knows nothing of the package.
     """
     structure, protocol, messages, leaders, x0, ends = _both(seed, apart)
-    bounds = bound_late(structure, protocol, messages, x0, ends.intervals, leaders)
+    bounds = bound_late(LateCase(structure, protocol, messages, x0, ends.intervals, leaders))
     graph, T, rng = structure.graph, float(protocol.T), np.random.default_rng(seed)
     W, ages = np.zeros((graph.n_nodes,) * 2), np.full((graph.n_nodes,) * 2, float(messages.age))
     W[graph.target, graph.source] = graph.weights
@@ -606,8 +608,8 @@ def test_64_graphs_whose_leaders_flee_while_messages_are_late_keep_their_bounds(
     pattern: int, part: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first = 3000 + 16 * pattern + 4 * part
-    monkeypatch.setattr(late_messages, "_TRIED", 3)
-    monkeypatch.setattr("ptcc_certify.bounds.delay.late_steps.MOST_INSTANTS", 300)
+    monkeypatch.setattr(decay_by_rows, "_TRIED", 3)
+    monkeypatch.setattr("ptcc_certify.bounds.delay.decay_by_steps.MOST_INSTANTS", 300)
     ratios, last = zip(*(_flight_ratio(first + k, pattern, k == 0) for k in range(4)), strict=True)
     assert max(ratios) <= 1 + ROUNDING, ratios
     assert max(last) > 0.3, last
@@ -628,7 +630,7 @@ def test_240_graphs_whose_leaders_flee_while_messages_are_late_keep_their_bounds
 @pytest.mark.parametrize("seed", thinned(range(3000, 3012), 3))
 def test_runs_of_the_package_behind_fleeing_leaders_keep_the_bounds(seed: int) -> None:
     structure, protocol, messages, leaders, x0, ends = _both(seed)
-    bounds = bound_late(structure, protocol, messages, x0, ends.intervals, leaders)
+    bounds = bound_late(LateCase(structure, protocol, messages, x0, ends.intervals, leaders))
     pattern: Any = PATTERNS[seed % 4]
     run = simulate_late(structure.graph, protocol, messages, x0, pattern=pattern, steps=300, leaders=leaders)
     assert run.targets is not None
@@ -643,8 +645,8 @@ def test_runs_of_the_package_behind_fleeing_leaders_keep_the_bounds(seed: int) -
 @pytest.mark.parametrize("seed", thinned(range(8), 3))
 def test_without_speed_and_disturbance_nothing_changes(seed: int) -> None:
     structure, protocol, messages, _, x0, ends = _both(4000 + seed, apart=seed % 2 == 0)
-    still = bound_late(structure, protocol, messages, x0, ends.intervals)
-    moving = bound_late(structure, protocol, messages, x0, ends.intervals, MovingLeaders(speed=0))
+    still = bound_late(LateCase(structure, protocol, messages, x0, ends.intervals))
+    moving = bound_late(LateCase(structure, protocol, messages, x0, ends.intervals, MovingLeaders(speed=0)))
     assert still.residual is not None and moving.residual is not None
     np.testing.assert_array_equal(still.residual, moving.residual)
     for one, other in zip(still.rows, moving.rows, strict=False):
@@ -664,7 +666,9 @@ def test_with_ever_shorter_delays_the_bound_comes_to_that_of_tracking(seed: int)
     allowed = tracking.distance_bound(1 - t / float(protocol.T)).max(axis=0)
     left, before = [], []
     for age in ("1e-3", "1e-5", "1e-7"):
-        late = bound_late(structure, protocol, LateMessages(protocol.T * Fraction(age)), x0, ends.intervals, leaders)
+        late = bound_late(
+            LateCase(structure, protocol, LateMessages(protocol.T * Fraction(age)), x0, ends.intervals, leaders)
+        )
         left.append(late.largest)
         before.append((late.deviation_bound(t).max(axis=0) / allowed).max())
     assert left[1] <= 0.6 * left[0] + 1e-9 and left[2] <= 0.6 * left[1] + 1e-9, left
@@ -697,12 +701,12 @@ def test_the_drift_of_rows_is_that_of_an_equation_with_a_capped_gain() -> None:
 def test_what_no_gain_takes_away_stays_below_the_bound_and_above_nothing() -> None:
     structure = analyse(SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1), ("c", "d", -1)]))
     strong = NominalProtocol(T=1, rho1=1, rho2=60, kappa=1)
-    late = bound_late(structure, strong, LateMessages(Fraction(1, 50)), leaders=MovingLeaders("1/2"))
+    late = bound_late(LateCase(structure, strong, LateMessages(Fraction(1, 50)), leaders=MovingLeaders("1/2")))
     assert late.never_below is not None and math.isclose(late.never_below, 0.03, rel_tol=1e-6)  # 3 links of 0.01
     assert late.never_below <= late.largest <= 1.1 * late.never_below
     assert replace(late, steps=None).never_below == late.never_below  # rows of another gain leave less than these
     assert replace(late, steps=None, rows=()).never_below is None
-    assert bound_late(structure, strong, LateMessages(Fraction(1, 50))).never_below is None
+    assert bound_late(LateCase(structure, strong, LateMessages(Fraction(1, 50)))).never_below is None
 
 
 def test_late_messages_and_leaders_that_move_are_saved_and_read() -> None:
@@ -739,10 +743,8 @@ def test_late_messages_and_leaders_of_which_nothing_is_proved_are_read_back(monk
     assert (saved.late.messages, saved.late.leaders) == (messages, leaders)
 
 
-def _nothing(
-    structure: Structure, protocol: Any, messages: LateMessages, x0: Any, ends: Any, leaders: Any
-) -> LateBounds:
-    return LateBounds(messages, structure, protocol.gain, x0 is None, leaders=leaders)
+def _nothing(case: LateCase) -> LateBounds:
+    return LateBounds(case, case.initial_state is None)
 
 
 def test_the_longest_delay_behind_leaders_that_move_is_certified() -> None:
@@ -755,7 +757,7 @@ def test_the_longest_delay_behind_leaders_that_move_is_certified() -> None:
     assert made.late is not None and made.late.enough is not None and 0 < made.late.enough < Fraction(1, 5)
     structure, x0, again = made.structure, [Fraction(x) for x in (1, 2, 3)], replace(messages, delay=made.late.enough)
     ends = final_state(structure, x0).intervals
-    assert bound_late(structure, protocol, again, x0, ends, leaders).largest <= 0.05
+    assert bound_late(LateCase(structure, protocol, again, x0, ends, leaders)).largest <= 0.05
 
 
 @pytest.mark.parametrize(("cap", "speed"), thinned([(None, None), (100, None), (None, "1/2"), (100, "1/2")], 3))
@@ -790,5 +792,5 @@ def test_rows_that_floats_do_not_resolve_leave_what_is_late_unproved(delay: obje
     monkeypatch.setattr(FollowerRows, "witness", unresolved)
     structure = analyse(SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1), ("c", "b", 1)]))
     messages = LateMessages(delay=delay, value_error="0.1", gain_cap=5)
-    bounds = bound_late(structure, NominalProtocol(T=1, rho1=1, rho2=4, kappa=1), messages)
+    bounds = bound_late(LateCase(structure, NominalProtocol(T=1, rho1=1, rho2=4, kappa=1), messages))
     assert bounds.rows == () and bounds.steps is None and not bounds.says_something

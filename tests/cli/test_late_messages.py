@@ -29,7 +29,6 @@ from ptcc_certify import (
     read_graph,
     simulate,
 )
-from ptcc_certify.bounds.delay.longest_delay import LateCase
 from ptcc_certify.certificate import section_writer
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.model.asks import Asks
@@ -122,9 +121,8 @@ def test_the_delay_up_to_which_a_wanted_residual_is_told_to_be_certified_is_cert
 def test_no_delay_is_told_that_the_check_does_not_accept(monkeypatch: pytest.MonkeyPatch) -> None:
     words = ("team.csv", "--delay", "0.02", "--max-residual", "0.001", *START, *QUICK)
     monkeypatch.setattr(
-        LateCase,
-        "longest",
-        lambda self, late, asked: replace(late, residual=np.zeros(4), messages=LateMessages("0.01")),
+        "ptcc_certify.certificate.graph_certification.longest_delay",
+        lambda late, _: replace(late, residual=np.zeros(4), case=replace(late.case, messages=LateMessages("0.01"))),
     )
     assert "older" not in ptcc("certify", *words).out
 

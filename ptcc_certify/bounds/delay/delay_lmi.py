@@ -23,16 +23,9 @@ from lmi.exact.decimal_rounding import float_up
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.numbers import common_denominator
 from lmi.exact.work import WorkError
-from ptcc_certify.bounds.delay.small_delays import left_above
-from ptcc_certify.bounds.final_state.of_graph import Influence
+from ptcc_certify.bounds.delay.case import LateCase
 from ptcc_certify.checker.delay_lmi import DelayLMI, LateLoop, Row, channels_of
-from ptcc_certify.checker.input_formulas import BITS, Limits
-from ptcc_certify.checker.late_input import gain_above
-from ptcc_certify.checker.late_messages import PARTS
-from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.model.gain import Gain
-from ptcc_certify.model.late_messages import LateMessages
-from ptcc_certify.model.limited_gain import LimitedGain
+from ptcc_certify.checker.input_formulas import BITS
 
 #: Above so many free agents nothing is searched; above the other the first function that is found is taken, and the
 #: longest delay sought by factors of 2 alone: a search takes 0.3 s with 20 free agents, 2 to 4 s with 30, 10 s with 40.
@@ -78,10 +71,10 @@ class DelayLMIBound:
     away: tuple[Fraction, ...]
     residual: tuple[Fraction, ...]
 
-    def deviation_bound(self, gain: LimitedGain, t: np.ndarray) -> np.ndarray:
+    def deviation_bound(self, case: LateCase, t: np.ndarray) -> np.ndarray:
         """Return what bounds ``|x_k - (Q X(0))_k|`` at instants up to ``T``, ``(N, M)`` floats."""
         moved, away = (np.array([[float_up(x)] for x in values]) for values in (self.moved, self.away))
-        bound: np.ndarray = (moved + away * np.exp(-float(self.b) * gain.clock(t))) * float(_MORE)
+        bound: np.ndarray = (moved + away * np.exp(-float(self.b) * case.limited().clock(t))) * float(_MORE)
         return bound
 
 
@@ -90,63 +83,48 @@ class DelayLMIBounds:
 
     Parameters
     ----------
-    structure : Structure
-    gain : Gain
-    messages : LateMessages
-        With a ``gain_cap``.
-    influence : Influence
-        Exact.
-    initial_state : sequence of N Fraction
+    case : LateCase
+        With a ``gain_cap``, an exact influence, and an initial state.
     """
 
-    def __init__(
-        self,
-        structure: Structure,
-        gain: Gain,
-        messages: LateMessages,
-        influence: Influence,
-        initial_state: Sequence[Fraction],
-    ):
-        assert messages.gain_cap is not None
-        self.structure, self.gain, self.messages, self.state = structure, gain, messages, initial_state
-        self.cap, self.clock = messages.gain_cap, Limits(messages.gain_cap).clock_below(gain.exact)
-        self.influence = influence
+    @staticmethod
+    def asked(case: LateCase) -> bool:
+        """Tell whether such bounds are asked of a case."""
+        return case.of_whole_graph
+
+    def __init__(self, case: LateCase):
+        cap, clock = case.messages.gain_cap, case.clock()
+        assert case.influence is not None and cap is not None and clock is not None
+        self.case, self.graph, self.influence, self.cap, self.clock = case, case.graph, case.influence, cap, clock
 
     def loop(self, factor: Fraction = Fraction(1)) -> LateLoop:
         """Return what is late, every age multiplied by a factor."""
-        lateness = [self.cap * x * factor for x in self._ages]
+        shares, oldest = self.case.shares, self.cap * self.case.messages.age * factor
+        lateness = [oldest * Fraction(float(x)) for x in (np.ones(self.graph.n_edges) if shares is None else shares)]
         channels = channels_of(self._edges, lateness, [not row for row in self._whole.laplacian], self._whole.own_late)
         return replace(self._whole, channels=channels)
 
     @cached_property
     def _whole(self) -> LateLoop:
         """The graph, nothing late."""
-        nodes, first = range(self.structure.graph.n_nodes), {c.nodes[0] for c in self.influence.balanced}
-        rows = self.structure.graph.exact_rows(nodes)
-        unit = common_denominator({x.denominator for row in rows for x in row.values()}, self.structure.graph.n_edges)
+        nodes, first = range(self.graph.n_nodes), {c.nodes[0] for c in self.influence.balanced}
+        rows = self.case.rows
+        unit = common_denominator({x.denominator for row in rows for x in row.values()}, self.graph.n_edges)
         laplacian = [{j: int(x * unit) for j, x in row.items()} for row in rows]
         projection = [{j: Fraction(x) for j, x in self.influence.row(v).items()} for v in nodes]
         free = [v for v in nodes if v not in first]
-        return LateLoop(laplacian, unit, projection, free, (), self.messages.own_delay)
+        return LateLoop(laplacian, unit, projection, free, (), self.case.messages.own_delay)
 
     @cached_property
     def _edges(self) -> list[tuple[int, int, int]]:
         """Source, listener and weight of every edge."""
-        ends = zip(self.structure.graph.source.tolist(), self.structure.graph.target.tolist(), strict=True)
+        ends = zip(self.graph.source.tolist(), self.graph.target.tolist(), strict=True)
         return [(s, t, -self._whole.laplacian[t][s]) for s, t in ends]
-
-    @cached_property
-    def _ages(self) -> list[Fraction]:
-        """What is heard over each edge is so old at most, rounded up to 64ths of the oldest."""
-        latencies, age = self.messages.latencies(self.structure.graph), self.messages.age
-        if not isinstance(latencies, tuple):
-            return [age] * self.structure.graph.n_edges
-        return [math.ceil(PARTS * (x + self.messages.held) / age) * age / PARTS for x in latencies]
 
     @property
     def _free(self) -> int:
         """The number of free agents."""
-        return self.structure.graph.n_nodes - len(self.influence.balanced)
+        return self.graph.n_nodes - len(self.influence.balanced)
 
     @property
     def _small(self) -> bool:
@@ -167,7 +145,7 @@ class DelayLMIBounds:
 
     def _search(self, loop: LateLoop) -> Iterator[tuple[float, float, np.ndarray, np.ndarray]]:
         """Yield functions, as far as floats tell: how much is left at ``T``, in some unit, and ``b, P, tau``."""
-        system, exact = _system(loop), loop.coordinates(self.state)
+        system, exact = _system(loop), loop.coordinates(self.case.state)
         start = np.array([float(x / (max(map(abs, exact)) or 1)) for x in exact])
         D, most = _dense(loop.deviations, len(loop.free)), _fastest(system)
         # of how far the final state walks the largest sum of squares, over the columns that do
@@ -189,7 +167,7 @@ class DelayLMIBounds:
         """
         with suppress(OverflowError):
             if self._small:
-                return self._longest_factor() * float(self.messages.age)
+                return self._longest_factor() * float(self.case.messages.age)
         return 0.0
 
     def _longest_factor(self) -> float:
@@ -229,14 +207,14 @@ class DelayLMIBounds:
         lmi = DelayLMI(loop, b, matrix, each)
         if not lmi.proved(exact):
             return None
-        root, left = lmi.root(self.state), left_above(b * self.clock)
+        root, left = lmi.root(self.case.state), self.case.left(b)
         constants = lmi.constants(exact)
         moved = [rounded(root * x * _MORE, BITS, up=True) for x in constants.walk]
         away = [rounded(root * x * _MORE, BITS, up=True) for x in constants.away]
         residual = [rounded(x + y * left, BITS, up=True) for x, y in zip(moved, away, strict=True)]
         by_edge = dict(zip((e.edge for e in loop.channels), each, strict=True))
-        edges = tuple(by_edge.get(k, Fraction(0)) for k in range(self.structure.graph.n_edges))
-        y = root * gain_above(self.gain.exact, self.cap, b)
+        edges = tuple(by_edge.get(k, Fraction(0)) for k in range(self.graph.n_edges))
+        y = root * self.case.highest(b)
         inputs = np.array([float_up(x * y * _MORE) for x in lmi.inputs(*constants)]) + 1e-300
         bounds = (tuple(x) for x in (moved, away, residual))
         return DelayLMIBound(b, tuple(map(tuple, matrix)), edges, left, *bounds), inputs

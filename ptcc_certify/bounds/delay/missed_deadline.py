@@ -16,9 +16,9 @@ from fractions import Fraction
 import numpy as np
 
 from lmi.exact.elementary_enclosures import exp, log, rounded
+from ptcc_certify.bounds.delay.case import LateCase
 from ptcc_certify.checker.input_formulas import BITS
 from ptcc_certify.graphs.rationals import writable
-from ptcc_certify.lyapunov.follower_rows import FollowerRows
 from ptcc_certify.model.base import Protocol
 
 #: Followers up to which it is searched who misses the deadline.
@@ -44,13 +44,7 @@ class Missed:
     gauge: np.ndarray
 
 
-def find_missed(
-    rows: FollowerRows,
-    protocol: Protocol,
-    latencies: Fraction | tuple[Fraction, ...],
-    initial_state: Sequence[Fraction],
-    ends: Sequence[tuple[Fraction, Fraction]],
-) -> Missed | None:
+def find_missed(case: LateCase, followers: Sequence[int]) -> Missed | None:
     """Return the agent that is certain to miss the deadline by most; None if none is found.
 
     With signs ``g`` that fit the weights among all followers that agent ``k`` hears of, also by others, and
@@ -58,12 +52,12 @@ def find_missed(
 
         |eps_k(T)| >= sum_l (|w_kl|/D_k) e^(-D_l s(T - tau_kl)) |eps_l(0)|.
     """
-    if rows.D.size > _MISSED_FOLLOWERS:
+    initial_state, ends = case.initial_state, case.ends
+    if initial_state is None or ends is None or len(followers) > _MISSED_FOLLOWERS:
         return None
-    graph = rows.structure.graph
+    graph, latencies = case.graph, case.messages.latencies(case.of)
     delays = latencies if isinstance(latencies, tuple) else (latencies,) * graph.n_edges
     of = {(s, t): x for s, t, x in zip(graph.source.tolist(), graph.target.tolist(), delays, strict=True)}
-    followers = [int(v) for v in rows.followers]
     exact = dict(zip(followers, graph.exact_rows(followers), strict=True))
     heard = {k: [j for j in exact[k] if j != k and j in exact] for k in followers}
     best: Missed | None = None
@@ -76,7 +70,7 @@ def find_missed(
         bound = Fraction(0)
         for j in heard[k]:
             size = max(abs(initial_state[j] - ends[j][0]) - ends[j][1], Fraction(0))
-            bound += abs(exact[k][j]) / exact[k][k] * _kept(protocol, exact[j][j], of[j, k]) * size
+            bound += abs(exact[k][j]) / exact[k][k] * _kept(case.protocol, exact[j][j], of[j, k]) * size
         bound = rounded(bound, BITS) if bound > 0 else bound
         if bound > 0 and writable(bound) and (best is None or bound > best.bound):
             best = Missed(k, bound, np.array([signs.get(v, 0) for v in followers]))

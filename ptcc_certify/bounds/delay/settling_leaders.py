@@ -11,7 +11,7 @@ Leaders move as if nothing were late: ``|x_l - x_l*| <= sqrt(c_l V(0)) e^(-r s/2
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -20,14 +20,9 @@ import numpy as np
 from lmi.dyadic import round_to_bits
 from lmi.exact.decimal_rounding import float_up
 from lmi.exact.elementary_enclosures import log, rounded
-from ptcc_certify.bounds.delay.small_delays import DecayingForm, left_above
-from ptcc_certify.checker.input_formulas import BITS, Limits, root_above
-from ptcc_certify.checker.late_input import gain_above
-from ptcc_certify.checker.late_messages import PARTS
+from ptcc_certify.bounds.delay.case import DecayingForm, LateCase
+from ptcc_certify.checker.input_formulas import BITS, root_above
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.late_messages import LateMessages
-from ptcc_certify.model.limited_gain import LimitedGain
 
 #: Values of ``q`` that are tried, and the largest one; shares of the largest ``b``.
 _TRIED, _LARGEST_Q, _SHARES = 16, 1e9, (0.3, 0.6, 0.85, 0.97)
@@ -62,12 +57,10 @@ class Settling:
         """What bounds ``|x_k(T) - x_k*|``, ``(N,)`` floats from above."""
         return np.array([float_up(x * self.left) for x in self.u])
 
-    def deviation_bound(self, gain: LimitedGain, t: np.ndarray) -> np.ndarray:
+    def deviation_bound(self, case: LateCase, t: np.ndarray) -> np.ndarray:
         """Return what bounds ``|x_k - x_k*|`` at instants, ``(N, M)`` floats."""
-        caps = [x for x in (self.cap, gain.limits.gain_cap) if x is not None]
-        clock = GainLimits(gain_cap=min(caps)).limit(gain.gain).clock(t)
         u = np.array([float_up(x) for x in self.u])
-        return np.asarray(u[:, None] * np.exp(-float(self.b) * clock) * (1 + _MORE))
+        return np.asarray(u[:, None] * np.exp(-float(self.b) * case.limited(self.cap).clock(t)) * (1 + _MORE))
 
 
 class SettlingBounds:
@@ -75,57 +68,51 @@ class SettlingBounds:
 
     Parameters
     ----------
-    structure : Structure
-    gain : LimitedGain
-        The gain that acts.
-    messages : LateMessages
-        Leaders hear each other at once.
-    initial_state : sequence of N Fraction
-    ends : sequence of N (middle, radius)
-        Of ``Q X(0)``.
+    case : LateCase
+        With an initial state; leaders hear each other at once.
     """
 
-    def __init__(
-        self,
-        structure: Structure,
-        gain: LimitedGain,
-        messages: LateMessages,
-        initial_state: Sequence[Fraction],
-        ends: Sequence[tuple[Fraction, Fraction]],
-    ):
-        self.structure, self.gain, self.messages = structure, gain, messages
-        graph, n = structure.graph, structure.graph.n_nodes
-        rows = graph.exact_rows(range(n))
-        self.errors = [-sum((x * initial_state[v] for v, x in row.items()), Fraction(0)) for row in rows]
-        self.away = np.array([float_up(abs(x - m) + r) for x, (m, r) in zip(initial_state, ends, strict=True)])
-        self.D = graph.in_weight()
-        self.groups = [v for c in structure.closed_components if len(c.nodes) > 1 for v in c.nodes]
-        latencies = messages.latencies(graph)
-        each = latencies if isinstance(latencies, tuple) else (latencies,) * graph.n_edges
+    @staticmethod
+    def asked(case: LateCase) -> bool:
+        """Tell whether leaders of a case form groups, and settle by themselves."""
+        structure = case.structure
+        if case.relative or not case.forms or not case.messages.age or not isinstance(structure, Structure):
+            return False
+        return bool(case.groups and structure.followers.size) and case.messages.leaders_hear_at_once(structure)
+
+    def __init__(self, case: LateCase):
+        graph, n = case.graph, case.graph.n_nodes
+        self.case, self.followers, self.D = case, case.followers, graph.in_weight()
+        each = zip(case.state, case.ends or (), strict=True)
+        self.away = np.array([float_up(abs(x - m) + r) for x, (m, r) in each])
         self.W, self.shares = np.zeros((2, n, n))
         self.W[graph.target, graph.source] = np.abs(graph.weights)
-        self.shares[graph.target, graph.source] = [math.ceil(PARTS * x / messages.age) / PARTS for x in each]
+        self.shares[graph.target, graph.source] = 1 if case.shares is None else case.shares
 
-    def best(self, forms: Sequence[DecayingForm]) -> Settling | None:
-        """Return what leaves least at ``T``; None if no function serves."""
-        found = [bound for one in forms for bound in self._tried(one)]
-        return min(found, key=lambda bound: float(max(bound.u) * bound.left), default=None)
+    def best(self) -> tuple[Settling, np.ndarray | None] | None:
+        """Return what leaves least at ``T``, under a cap with bounds of inputs; None if no function serves."""
+        found = [bound for one in self.case.forms for bound in self._tried(one)]
+        if not found:
+            return None
+        best = min(found, key=lambda bound: float(max(bound.u) * bound.left))
+        return best, None if self.case.messages.gain_cap is None else self.inputs(best)
 
     def inputs(self, bound: Settling) -> np.ndarray:
         """Return what bounds ``|x_k'|`` up to ``T`` under a capped gain, ``(N,)`` floats from above."""
-        cap, u = self.messages.gain_cap, np.array([float_up(x) for x in bound.u])
-        assert cap is not None
-        y = float_up(gain_above(self.gain.gain.exact, cap, bound.b, bound.cap))
+        u, F, y = (
+            np.array([float_up(x) for x in bound.u]),
+            self.followers,
+            float_up(self.case.highest(bound.b, bound.cap)),
+        )
         most = self.D * u + self.W @ u
-        F = self.structure.followers
         most[F] = (2 * self.D[F] - float(bound.b)) * u[F]
         return most * y * (1 + _MORE) + 1e-300
 
     def _tried(self, one: DecayingForm) -> Iterator[Settling]:
         """Yield bounds by one function, for some ``q`` and ``b``."""
-        F, most = self.structure.followers, float(one.form.rate) / 2 * (1 - _MORE)
+        F, most = self.followers, float(one.form.rate) / 2 * (1 - _MORE)
         leaders, root = np.zeros(self.D.size), self._root(one)
-        exact = {v: rounded(root_above(one.deviations[v]) * root, BITS, up=True) for v in self.groups}
+        exact = {v: rounded(root_above(one.deviations[v]) * root, BITS, up=True) for v in self.case.groups}
         leaders[list(exact)] = [float_up(x) for x in exact.values()]
         for tried in np.exp(math.log(_LARGEST_Q) * np.linspace(0, 1, _TRIED + 1)[1:] ** 3):
             q = round_to_bits(float(tried), 24)
@@ -142,16 +129,15 @@ class SettlingBounds:
                     yield self._bound(one.function, Fraction(q), b, exact, u * (1 + _MORE))
 
     def _bound(self, function: int, q: Fraction, b: float, leaders: dict[int, Fraction], own: np.ndarray) -> Settling:
-        rate, gain_cap = Fraction(b), self.messages.gain_cap
-        cap = rounded(log(q)[0] / (rate * self.messages.age), BITS)
-        clock = Limits(cap if gain_cap is None else min(cap, gain_cap)).clock_below(self.gain.gain.exact)
-        u = [Fraction(0)] * self.D.size
-        for v, x in (*leaders.items(), *zip(self.structure.followers.tolist(), own, strict=True)):
+        rate, u = Fraction(b), [Fraction(0)] * self.D.size
+        cap = rounded(log(q)[0] / (rate * self.case.messages.age), BITS)
+        for v, x in (*leaders.items(), *zip(self.followers.tolist(), own, strict=True)):
             u[v] = x if isinstance(x, Fraction) else rounded(Fraction(float(x)), BITS, up=True)
-        left = left_above(rate * clock)
-        return Settling(function, q, rate, cap, clock, left, tuple(u))
+        clock = self.case.clock(cap)
+        assert clock is not None
+        return Settling(function, q, rate, cap, clock, self.case.left(rate, cap), tuple(u))
 
     def _root(self, one: DecayingForm) -> Fraction:
         """Bound ``sqrt(V(0))`` from above, followers where their errors are 0."""
-        groups = set(self.groups)
-        return root_above(one.form.value([self.errors[v] if v in groups else Fraction(0) for v in one.form.nodes]))
+        groups, errors = set(self.case.groups), self.case.errors
+        return root_above(one.form.value([errors[v] if v in groups else Fraction(0) for v in one.form.nodes]))

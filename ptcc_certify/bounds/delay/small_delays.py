@@ -11,7 +11,6 @@ E'P E`` of rate ``r``, ``e_k^2 <= c_k V``, ``q >= e^(b h)`` and
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -19,31 +18,14 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import float_up
 from lmi.exact.elementary_enclosures import exp, rounded
-from ptcc_certify.bounds.final_state.of_graph import Influence
-from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above, root_above
-from ptcc_certify.checker.late_input import gain_above
-from ptcc_certify.checker.quadratic_form import Form
+from ptcc_certify.bounds.delay.case import DecayingForm, LateCase
+from ptcc_certify.checker.input_formulas import BITS, root_above
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.model.gain import Gain
-from ptcc_certify.model.late_messages import LateMessages
 
 #: Halvings of the interval of ``b``, and of the longest delay.
 _HALVINGS = 40
 #: Room for rounding, relatively.
 _MORE = 1e-9
-#: What is left is told to be at least this: less would take too many digits to write.
-LEAST_LEFT = Fraction(1, 2**1000)
-
-
-def left_above(x: Fraction) -> Fraction:
-    """Bound ``e^-x`` from above by a number that is short enough for a file.
-
-    Examples
-    --------
-    >>> float(left_above(Fraction(1))), left_above(Fraction(90_000)) == LEAST_LEFT
-    (0.36787944117144233, True)
-    """
-    return max(rounded(decay_above(x), BITS, up=True), LEAST_LEFT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,68 +54,40 @@ class SmallDelays:
     residual: tuple[Fraction, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class DecayingForm:
-    """A Lyapunov function of a graph as this needs it.
-
-    Attributes
-    ----------
-    function : int
-        Its number.
-    form : Form
-        In the coordinates ``E``.
-    errors, deviations : sequence of N Fraction
-        ``e_k^2 <= errors_k V``, ``(x_k - (Q x)_k)^2 <= deviations_k V``.
-    """
-
-    function: int
-    form: Form
-    errors: Sequence[Fraction]
-    deviations: Sequence[Fraction]
-
-
 class SmallDelayBounds:
     """Bounds of one graph under one capped gain.
 
     Parameters
     ----------
-    structure : Structure
-    gain : Gain
-    messages : LateMessages
-        With a ``gain_cap``.
-    influence : Influence
-        Exact.
-    initial_state : sequence of N Fraction
+    case : LateCase
+        With a ``gain_cap``, an exact influence, and an initial state.
     """
 
-    def __init__(
-        self,
-        structure: Structure,
-        gain: Gain,
-        messages: LateMessages,
-        influence: Influence,
-        initial_state: Sequence[Fraction],
-    ):
-        self.structure, self.gain, self.messages, self.influence = structure, gain, messages, influence
-        n = structure.graph.n_nodes
-        rows = structure.graph.exact_rows(range(n))
-        own = messages.own_delay
-        self.B = [{v: abs(x) for v, x in row.items() if own or v != k} for k, row in enumerate(rows)]
-        self.errors = [-sum((x * initial_state[v] for v, x in row.items()), Fraction(0)) for row in rows]
+    @staticmethod
+    def asked(case: LateCase) -> bool:
+        """Tell whether such bounds are asked of a case."""
+        return case.of_whole_graph and bool(case.forms)
+
+    def __init__(self, case: LateCase):
+        n, own, cap = case.graph.n_nodes, case.messages.own_delay, case.messages.gain_cap
+        assert case.influence is not None and cap is not None
+        self.case, self.cap, self.influence = case, cap, case.influence
+        self.B = [{v: abs(x) for v, x in row.items() if own or v != k} for k, row in enumerate(case.rows)]
         self._B = np.array([[float(row.get(v, 0)) for v in range(n)] for row in self.B])
-        self._L = np.array([[float(row.get(v, 0)) for v in range(n)] for row in rows])
-        assert messages.gain_cap is not None
-        self.cap, self.clock = messages.gain_cap, Limits(messages.gain_cap).clock_below(gain.exact)
+        self._L = np.array([[float(row.get(v, 0)) for v in range(n)] for row in case.rows])
 
-    def best(self, forms: Sequence[DecayingForm]) -> SmallDelays | None:
-        """Return what leaves least at ``T``; None if no function forgives this delay."""
-        found = [one for one in map(self.bound, forms) if one is not None]
-        return min(found, key=lambda one: max(one.residual), default=None)
+    def best(self) -> tuple[SmallDelays, np.ndarray] | None:
+        """Return what leaves least at ``T``, with bounds of inputs; None if no function forgives this delay."""
+        found = [(bound, one) for one in self.case.forms if (bound := self.bound(one)) is not None]
+        if not found:
+            return None
+        bound, one = min(found, key=lambda pair: max(pair[0].residual))
+        return bound, self.inputs(one, bound)
 
-    def longest_delay(self, forms: Sequence[DecayingForm]) -> float:
+    def longest_delay(self) -> float:
         """Return the longest delay that some function forgives, about: this certificate's limit, not the loop's."""
         longest = 0.0
-        for one in forms:
+        for one in self.case.forms:
             low, high = 0.0, float(one.form.rate) / float(self.cap)
             weights = self._weights(one)
             for _ in range(_HALVINGS):
@@ -144,7 +98,7 @@ class SmallDelayBounds:
 
     def bound(self, one: DecayingForm) -> SmallDelays | None:
         """Return what one function proves; None if it does not forgive this delay."""
-        h = self.cap * self.messages.age
+        h = self.cap * self.case.messages.age
         guess = self._largest_b(one, self._weights(one), float(h))
         if not guess:
             return None
@@ -156,7 +110,7 @@ class SmallDelayBounds:
         exact = [rounded(Fraction(x), BITS, up=True) for x in phi]
         pushed = [sum((x * exact[v] for v, x in row.items()), Fraction(0)) for row in self.B]
         kap = Fraction(self._kap(self._weights(one), np.array([float(x) for x in pushed])) * (1 + _MORE))
-        left = left_above(b * self.clock)
+        left = self.case.left(b)
         root = self._root(one)
         moved, residual = list[Fraction](), list[Fraction]()
         for k, c in enumerate(one.deviations):
@@ -167,12 +121,12 @@ class SmallDelayBounds:
 
     def inputs(self, one: DecayingForm, bound: SmallDelays) -> np.ndarray:
         """Return what bounds ``|x_k'| <= g phi_k sqrt(V(0)) e^(-b s)`` up to ``T``, ``(N,)`` floats from above."""
-        y = self._root(one) * gain_above(self.gain.exact, self.cap, bound.b)
+        y = self._root(one) * self.case.highest(bound.b)
         return np.array([float_up(x * y) for x in bound.phi]) * (1 + _MORE) + 1e-300
 
     def _root(self, one: DecayingForm) -> Fraction:
         """Bound ``sqrt(V(0))`` from above."""
-        return root_above(one.form.value([self.errors[v] for v in one.form.nodes]))
+        return root_above(one.form.value([self.case.errors[v] for v in one.form.nodes]))
 
     def _weights(self, one: DecayingForm) -> np.ndarray:
         """Return ``|L'P L|`` in floats."""

@@ -16,6 +16,8 @@ from ptcc_certify.lyapunov.follower_rows import FollowerRows
 def stage_deadlines(rows: FollowerRows, T: Fraction, delay: Fraction) -> tuple[Fraction, ...] | None:
     """Return the deadline of every follower, ``T - (levels - level) delay``; None where followers form a cycle.
 
+    None are returned where information takes longer to arrive: the first deadline would not be positive.
+
     Parameters
     ----------
     rows : FollowerRows
@@ -26,7 +28,6 @@ def stage_deadlines(rows: FollowerRows, T: Fraction, delay: Fraction) -> tuple[F
     Returns
     -------
     tuple of Fraction, or None
-        None as well where information takes longer to arrive: the first deadline would not be positive.
 
     Examples
     --------
@@ -35,8 +36,10 @@ def stage_deadlines(rows: FollowerRows, T: Fraction, delay: Fraction) -> tuple[F
     (Fraction(9, 10), Fraction(1, 1))
     """
     level = levels(rows)
-    if level is None or T - (int(level.max()) - 1) * delay <= 0:
+    if level is None:
         return None
+    if T - (int(level.max()) - 1) * delay <= 0:
+        return ()
     most = int(level.max())
     due = {x: T - (most - x) * delay for x in np.unique(level).tolist()}
     return tuple(due[x] for x in level.tolist())

@@ -60,7 +60,7 @@ class InputRequest:
         The Lyapunov functions of the envelope; None for those of large graphs.
     constants : sequence of (sequence of Fraction or None)
         Of every one with a full matrix ``c_k``, ``e_k^2 <= c_k V``; asked for where there are initial states.
-    rate, limit : Fraction or None
+    rates : pair of (Fraction or None)
         The largest proved rate, and the proved upper bound on the decay rate.
     initial_state, initial_set
         ``X(0)``, or a set of initial states instead.
@@ -83,8 +83,7 @@ class InputRequest:
     protocol: Protocol
     forms: Sequence[Form | None]
     constants: Sequence[Sequence[Fraction] | None]
-    rate: Fraction | None
-    limit: Fraction | None
+    rates: tuple[Fraction | None, Fraction | None]
     initial_state: Sequence[Fraction] | None = None
     initial_set: InitialSet | None = None
     sigma0: Sequence[Fraction] | None = None
@@ -100,8 +99,8 @@ def bound_effort(request: InputRequest) -> Effort:
     """Bound the input."""
     structure, gain, influence = request.structure, request.protocol.gain, request.influence
     still, n = structure.graph.n_edges == 0, structure.graph.n_nodes
-    bounded, by = _decide_boundedness(structure, gain.pole, request.rate, request.limit, still)
-    lower, upper = (None if r is None else gain.pole * r / 2 for r in (request.rate, request.limit))
+    bounded, by = _decide_boundedness(structure, gain.pole, *request.rates, still)
+    lower, upper = (None if r is None else gain.pole * r / 2 for r in request.rates)
     sliding = _sliding_part(request)
     effort = Effort(bounded, by, (lower, upper), None, (None,) * len(request.forms), sliding=sliding)
     if (request.initial_state is None and request.initial_set is None) or still or n > INPUT_NODES:

@@ -39,7 +39,7 @@ def late_facts(certificate: Certificate) -> Facts:
     if late.leaders is not None:
         yield Fact(head="leaders", note=leaders_text(late.leaders))
     told = [*_impossible(late), *([] if late.direct else _left(late)), *_stages(late), *_kept_off(late)]
-    if (at := certificate.at) is not None and (late.rows or late.steps or late.settling or late.lmi):
+    if (at := certificate.at) is not None and late.over_time:
         bound = float(late.largest_bound([float(at)])[0])
         note = f"at t = {near(at)} every agent within {up(bound, 2)}"
         told.append(Fact(head="late", value=bound, side="up", note=note))
@@ -169,14 +169,7 @@ def _residual_text(late: LateBounds) -> str:
     """List what is left at ``T`` at most, agent by agent; empty where nothing is proved."""
     if math.isinf(late.largest):
         return ""
-    bounds = late.residual if late.residual is not None else np.full(len(late.labels), np.inf)
-    bounds = bounds if late.vehicles is None else late.vehicles.position
-    if late.settling is not None:
-        bounds = np.minimum(bounds, late.settling.residual)
-    for one in (late.form, late.lmi):
-        if one is not None:
-            bounds = np.minimum(bounds, [float_up(x) for x in one.residual])
-    names = late.labels
+    bounds, names = np.minimum.reduce(late.residuals), late.labels
     return shorten_list([f"{labelled(names[v])} {up(float(bounds[v]), 2)}" for v in range(len(names)) if bounds[v]])
 
 
@@ -254,7 +247,7 @@ def _limit_text(late: LateBounds) -> str:
 
 def _stages(late: LateBounds) -> Facts:
     """Tell the deadlines of stages, at which agents are at their final states exactly."""
-    if late.unarrived:
+    if late.staged == ():
         note = "no deadlines of stages: information takes longer than T from the leaders to the last agent"
         yield Fact(head="late", note=note)
     elif late.direct:

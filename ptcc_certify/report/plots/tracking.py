@@ -125,7 +125,7 @@ def _runs(
 def _draw_late_bound(ax: Axes, late: LateBounds, t: np.ndarray) -> None:
     """Draw what is proved with late messages, and what is the least that a bound can be."""
     ax.set_yscale("log")
-    if late.rows or late.steps is not None or late.settling is not None or late.lmi is not None:
+    if late.over_time:
         over_time = late.largest_bound(t)
         ax.plot(t, over_time, color=BOUND, linewidth=1.8, label="proved bound")
         nearer = bool(late.largest < _NEARER * over_time[-1])

@@ -23,8 +23,8 @@ from fractions import Fraction
 
 import numpy as np
 
+from ptcc_certify.bounds.delay.case import LateCase
 from ptcc_certify.lyapunov.follower_rows import FollowerRows
-from ptcc_certify.model.limited_gain import LimitedGain
 
 #: Instants at most, and products of weights that all instants together may take.
 MOST_INSTANTS, MOST_PRODUCTS = 2000, 20_000_000
@@ -58,6 +58,15 @@ class Steps:
     start: np.ndarray
     bounds: np.ndarray
 
+    def residual(self) -> np.ndarray:
+        """Return what bounds ``|eps(T)|``, ``(F,)`` floats."""
+        return np.asarray(self.bounds[-1] * (1 + _MORE) + 1e-300)
+
+    def deviation_bound(self, _: LateCase, t: np.ndarray) -> np.ndarray:
+        """Return what bounds ``|eps|`` at instants, ``(F, M)`` floats."""
+        at = np.searchsorted([float(x) for x in self.instants], t * (1 - 1e-15), side="right") - 1
+        return np.asarray(self.bounds[np.maximum(at, 0)].T)
+
 
 def instants_of(T: Fraction, delay: Fraction, most: int) -> tuple[Fraction, ...]:
     """Return instants from 0 to ``T``: near to ``T`` parts of the delay, farther away parts of the time left.
@@ -81,24 +90,17 @@ def instants_of(T: Fraction, delay: Fraction, most: int) -> tuple[Fraction, ...]
     return tuple(T * i / count for i in range(count + 1))
 
 
-def search_steps(
-    rows: FollowerRows, gain: LimitedGain, delay: Fraction, error: float, first: np.ndarray, push: float = 0.0
-) -> Steps | None:
+def search_steps(case: LateCase, rows: FollowerRows, first: np.ndarray) -> Steps | None:
     """Choose instants and start, and bound followers from instant to instant; None where the graph is too large.
 
     Parameters
     ----------
+    case : LateCase
+        Something is late.
     rows : FollowerRows
-    gain : LimitedGain
-        The gain that acts.
-    delay : Fraction
-        Positive, in units of time.
-    error : float
-        Of a value that is heard, from above.
+        Those of the case.
     first : (F,) array
         ``|eps(0)|`` from above.
-    push : float
-        How fast a follower and its target may part, from above.
 
     Raises
     ------
@@ -108,31 +110,22 @@ def search_steps(
     most = min(MOST_INSTANTS, MOST_PRODUCTS // (rows.W.nnz + 4 * rows.D.size))
     if most < _FEWEST:
         return None
-    start = _start(rows, error + _lags(rows, gain, push, (Fraction(0),))[0], first)
+    start = _start(rows, _wrong(case) + _lags(case, rows, (Fraction(0),))[0], first)
     if not 0 < float(start.max()) < np.inf:
         return None
-    instants = instants_of(gain.gain.T, delay * rows.least_share, most)
-    return bound_steps(rows, gain, delay, error, instants, start, push)
+    return bound_steps(case, rows, instants_of(case.protocol.T, case.messages.age * rows.least_share, most), start)
 
 
-def bound_steps(
-    rows: FollowerRows,
-    gain: LimitedGain,
-    delay: Fraction,
-    error: float,
-    instants: tuple[Fraction, ...],
-    start: np.ndarray,
-    push: float = 0.0,
-) -> Steps:
+def bound_steps(case: LateCase, rows: FollowerRows, instants: tuple[Fraction, ...], start: np.ndarray) -> Steps:
     """Bound followers from instant to instant, in floats that leave room for the integers of the check."""
-    parts = [(W, _hearing(instants, delay * Fraction(share))) for share, W in rows.by_age().items()]
-    clock = _clock(gain, instants)
+    parts = [(W, _hearing(instants, case.messages.age * Fraction(share))) for share, W in rows.by_age().items()]
+    clock, error = case.limited().clock(*_places(case, instants)), _wrong(case)
     size = float(start.max())
-    lags = _lags(rows, gain, push, instants[:-1])
+    lags = _lags(case, rows, instants[:-1])
     room, bounds = _UNIT * size * (np.diff(rows.W.indptr) + 6.0), [start + _UNIT * size]
     for i in range(1, len(instants)):
         before, heard = bounds[-1], sum(W @ bounds[at[i - 1]] for W, at in parts) / rows.D + error + room
-        if push and np.isfinite(clock[i]):
+        if np.isfinite(clock[i]):
             heard = heard + lags[i - 1]
         step = clock[i] - clock[i - 1] if np.isfinite(clock[i]) else np.inf
         left = _decay_above(rows.D * max(step, 0.0) * (1 - 1e-9))
@@ -140,11 +133,21 @@ def bound_steps(
     return Steps(instants, start, np.array(bounds))
 
 
-def _lags(rows: FollowerRows, gain: LimitedGain, push: float, instants: Sequence[Fraction]) -> np.ndarray:
+def _wrong(case: LateCase) -> float:
+    """Bound what is heard wrong."""
+    return float(case.exact.wrong) * (1 + _MORE)
+
+
+def _lags(case: LateCase, rows: FollowerRows, instants: Sequence[Fraction]) -> np.ndarray:
     """Return ``push/(D gain(t))`` at instants by follower, ``(m, F)``, a little above."""
-    T = gain.gain.T
-    left = np.array([float((T - t) / T) for t in instants])
-    return np.asarray(push / np.outer(gain.value(_floats(instants), remaining=left), rows.D) * (1 + _MORE))
+    push = float(case.leaders.total) * (1 + _MORE) if case.leaders is not None else 0.0
+    return np.asarray(push / np.outer(case.limited().value(*_places(case, instants)), rows.D) * (1 + _MORE))
+
+
+def _places(case: LateCase, instants: Sequence[Fraction]) -> tuple[np.ndarray, np.ndarray]:
+    """Return instants, and the shares of the time that are left there, in floats."""
+    T = case.protocol.T
+    return np.array([float(t) for t in instants]), np.array([float((T - t) / T) for t in instants])
 
 
 def _hearing(instants: Sequence[Fraction], delay: Fraction) -> list[int]:
@@ -175,14 +178,3 @@ def _start(rows: FollowerRows, error: np.ndarray, first: np.ndarray) -> np.ndarr
     slack = rows.D * witness.u - rows.W @ witness.u
     lacking = rows.W @ y + error * rows.D - rows.D * y + 1e-13 * rows.D * (y + error)
     return y + float(np.maximum(lacking / slack, 0).max() * (1 + 1e-6)) * witness.u
-
-
-def _clock(gain: LimitedGain, instants: Sequence[Fraction]) -> np.ndarray:
-    """Return the clock at instants, from the time that is left."""
-    T = gain.gain.T
-    left = np.array([float((T - t) / T) for t in instants])
-    return gain.clock(_floats(instants), remaining=left)
-
-
-def _floats(values: Sequence[Fraction]) -> np.ndarray:
-    return np.array([float(x) for x in values])

@@ -1,0 +1,195 @@
+"""What is asked of late messages: a graph or a family, a protocol, messages, and what is known already."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+
+import numpy as np
+
+from lmi.exact.elementary_enclosures import rounded
+from ptcc_certify.bounds.final_state.of_graph import Influence
+from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above
+from ptcc_certify.checker.late_input import gain_above
+from ptcc_certify.checker.late_messages import PARTS, Messages, Moving
+from ptcc_certify.checker.quadratic_form import Form
+from ptcc_certify.checker.side_files import Numbers
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.family import Family
+from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.lyapunov.follower_rows import listeners
+from ptcc_certify.model.base import Protocol
+from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.limited_gain import LimitedGain
+from ptcc_certify.model.moving_leaders import MovingLeaders
+
+#: What is left is told to be at least this: less would take too many digits to write.
+LEAST_LEFT = Fraction(1, 2**1000)
+
+
+def left_above(x: Fraction) -> Fraction:
+    """Bound ``e^-x`` from above by a number that is short enough for a file.
+
+    Examples
+    --------
+    >>> float(left_above(Fraction(1))), left_above(Fraction(90_000)) == LEAST_LEFT
+    (0.36787944117144233, True)
+    """
+    return max(rounded(decay_above(x), BITS, up=True), LEAST_LEFT)
+
+
+@dataclass(frozen=True, eq=False)
+class DecayingForm:
+    """A Lyapunov function of a graph as bounds with late messages need it.
+
+    Attributes
+    ----------
+    function : int
+        Its number.
+    form : Form
+        In the coordinates ``E``.
+    errors, deviations : sequence of N Fraction
+        ``e_k^2 <= errors_k V``, ``(x_k - (Q x)_k)^2 <= deviations_k V``.
+    """
+
+    function: int
+    form: Form
+    errors: Sequence[Fraction]
+    deviations: Sequence[Fraction]
+
+
+@dataclass(frozen=True, eq=False)
+class LateCase:
+    """A graph or a family whose messages are late.
+
+    Parameters
+    ----------
+    structure : Structure or Family
+        Of a family all bounds are by rows, for every signal.
+    protocol : Protocol
+        Its ``gain``; under the sliding-mode protocol with ``sigma(0) = 0``.
+    messages : LateMessages
+    initial_state : sequence of N Fraction, optional
+    ends : sequence of N (middle, radius), optional
+        Of ``Q X(0)``; without it bounds are for every initial state within 1 of its final one.
+    leaders : MovingLeaders, optional
+        Without a sign term: leaders move, and followers are disturbed; ``x*`` moves with the leaders.
+    influence : Influence, optional
+        Exact; it belongs to ``forms``.
+    forms : sequence of DecayingForm
+        Lyapunov functions of the whole graph: they forgive small delays under a cap, or tell how leaders settle.
+
+    Examples
+    --------
+    >>> pair = analyse(SignedDigraph.from_edges([(1, 2, 1)]))
+    >>> case = LateCase(pair, NominalProtocol(), LateMessages({(1, 2): "0.1"}, gain_cap=9))
+    >>> case.relative, case.least_cap(Fraction(4)), case.shares is None
+    (True, Fraction(4, 1), True)
+    """
+
+    structure: Structure | Family
+    protocol: Protocol
+    messages: LateMessages
+    initial_state: Sequence[Fraction] | None = None
+    ends: Sequence[tuple[Fraction, Fraction]] | None = None
+    leaders: MovingLeaders | None = None
+    influence: Influence | None = None
+    forms: Sequence[DecayingForm] = ()
+
+    @property
+    def of(self) -> SignedDigraph | Family:
+        """The graph or the family."""
+        return self.structure.graph if isinstance(self.structure, Structure) else self.structure
+
+    @property
+    def graph(self) -> SignedDigraph:
+        """The graph, if it is one."""
+        assert isinstance(self.structure, Structure)
+        return self.structure.graph
+
+    @cached_property
+    def followers(self) -> np.ndarray:
+        """The agents that hear others, ascending; of a graph that has leaders in groups, others than these."""
+        return self.structure.followers if isinstance(self.structure, Structure) else listeners(self.structure)
+
+    @property
+    def relative(self) -> bool:
+        """Whether bounds are for every initial state within 1 of its final one, in place of the given state."""
+        return self.initial_state is None or self.ends is None
+
+    @property
+    def of_whole_graph(self) -> bool:
+        """Whether Lyapunov functions of the whole graph may forgive what is late: under a cap, leaders at rest."""
+        still = self.leaders is None and self.initial_state is not None and not self.messages.value_error
+        return still and self.messages.gain_cap is not None and self.influence is not None and self.influence.exact
+
+    @property
+    def state(self) -> Sequence[Fraction]:
+        """The initial state, if there is one."""
+        assert self.initial_state is not None
+        return self.initial_state
+
+    @cached_property
+    def groups(self) -> list[int]:
+        """The leaders of one graph that belong to groups."""
+        assert isinstance(self.structure, Structure)
+        return [v for c in self.structure.closed_components if len(c.nodes) > 1 for v in c.nodes]
+
+    @cached_property
+    def rows(self) -> list[dict[int, Fraction]]:
+        """The rows of ``L`` of one graph."""
+        return self.graph.exact_rows(range(self.graph.n_nodes))
+
+    @cached_property
+    def errors(self) -> list[Fraction]:
+        """``E(0)`` of one graph."""
+        return [-sum((x * self.state[v] for v, x in row.items()), Fraction(0)) for row in self.rows]
+
+    @cached_property
+    def shares(self) -> np.ndarray | None:
+        """How old is what is heard over each edge in terms of the oldest, in 64ths, rounded up; None where all are 1.
+
+        Of a family by ordered pair of an edge.
+        """
+        latencies, age = self.messages.latencies(self.of), self.messages.age
+        if not isinstance(latencies, tuple) or not age:
+            return None
+        part = {x: math.ceil(PARTS * (x + self.messages.held) / age) for x in set(latencies)}
+        return None if min(part.values()) == PARTS else np.array([part[x] / PARTS for x in latencies])
+
+    # ------------------------------------------------------------------ the gain that acts
+
+    @cached_property
+    def exact(self) -> Messages:
+        """What the formulas of the check know of the messages, latencies left out."""
+        told, leaders = self.messages, self.leaders
+        moving = None if leaders is None else Moving(speed=leaders.speed, disturbance=leaders.disturbance)
+        late, latency = told.own_delay, Numbers([Fraction(0)])
+        return Messages(self.protocol.gain.exact, latency, told.age, late, told.value_error, told.gain_cap, moving)
+
+    def least_cap(self, cap: Fraction | None = None) -> Fraction | None:
+        """Return the cap of the gain, or another one that is lower."""
+        return min((x for x in (cap, self.messages.gain_cap) if x is not None), default=None)
+
+    def limited(self, cap: Fraction | None = None) -> LimitedGain:
+        """Return the gain that acts, under a cap."""
+        return GainLimits(gain_cap=self.least_cap(cap)).limit(self.protocol.gain)
+
+    def clock(self, cap: Fraction | None = None) -> Fraction | None:
+        """Bound its integral up to ``T`` from below; None where it is infinite."""
+        limit = self.least_cap(cap)
+        return None if limit is None else Limits(limit).clock_below(self.protocol.gain.exact)
+
+    def left(self, b: Fraction, cap: Fraction | None = None) -> Fraction:
+        """Bound ``e^(-b s(T))`` of this integral from above."""
+        clock = self.clock(cap)
+        return Fraction(0) if clock is None else left_above(b * clock)
+
+    def highest(self, b: Fraction, cap: Fraction | None = None) -> Fraction:
+        """Bound ``sup_t g e^(-b s)`` from above, ``g`` the gain that acts, which has a cap."""
+        assert self.messages.gain_cap is not None
+        return gain_above(self.protocol.gain.exact, self.messages.gain_cap, b, cap)

@@ -1,0 +1,207 @@
+"""What is left of followers of single leaders under late messages, by one positive vector of theirs.
+
+With ``D_k u_k - q sum_l |w_kl| u_l >= b u_k``, ``cap <= ln q / (b age)`` and ``s_c`` the integral of ``min(gain, cap)``
+
+    |x_k(t) - x_k*| <= u_k (initial e^(-b s_c(t)) + floor)
+
+for every gain that acts and all delays up to ``age``; ``initial`` is the largest ``|x_k(0) - x_k*| / u_k``, and
+``floor`` what errors of values add. Where leaders move, the target ``x_k*(t)`` does, too, and what is heard of it is
+off by ``speed age`` more; and there is added, inside the bracket,
+
+    (speed + disturbance) / min u  int_0^t e^(-b (s_c(t) - s_c(r))) dr.
+"""
+
+from __future__ import annotations
+
+import math
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+
+from lmi.dyadic import round_to_bits
+from lmi.errors import LMIError, NoCertificate
+from lmi.exact.decimal_rounding import float_up
+from lmi.exact.elementary_enclosures import log, rounded
+from ptcc_certify.bounds.delay.case import LateCase
+from ptcc_certify.bounds.tracking import drift_integral
+from ptcc_certify.checker.input_formulas import BITS
+from ptcc_certify.checker.late_drift import drift_above
+from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
+
+#: Up to so many followers many ``q`` are tried; beyond, the best of those that one vector proves.
+SEARCHED_FOLLOWERS = 3000
+#: Values of ``q`` that are tried, and the largest one; losses of ``b`` for a more even vector.
+_TRIED, _LARGEST_Q, _LOSSES = 10, 1e9, (0.01, 0.2, 0.6)
+#: What is added to a bound in floats, relatively and absolutely, so that it holds.
+MORE, LEAST = 1 + 1e-9, 1e-300
+
+
+@dataclass(frozen=True, eq=False)
+class RowBound:
+    """A bound by rows: ``|x_k(t) - x_k*| <= u_k (initial e^(-b s_c(t)) + floor)``, at ``T`` with ``left`` in its place.
+
+    Attributes
+    ----------
+    witness : RowWitness
+        ``q``, ``b`` and ``u``.
+    cap : Fraction or None
+        Of the clock ``s_c``; None where nothing is late.
+    clock : Fraction or None
+        ``s_c(T)`` from below; None where it is infinite.
+    left, initial, floor : Fraction
+        From above.
+    drift, after : Fraction or None
+        What leaders that move, and disturbances, add to ``floor`` at ``T``, and at all times; None where leaders rest.
+    """
+
+    witness: RowWitness
+    cap: Fraction | None
+    clock: Fraction | None
+    left: Fraction
+    initial: Fraction
+    floor: Fraction
+    drift: Fraction | None = None
+    after: Fraction | None = None
+
+    def residual(self, after: bool = False) -> np.ndarray:
+        """Return what bounds ``|x_k - x_k*|`` at ``T``, or from there on, for every follower, in floats from above."""
+        drift = (self.after if after else self.drift) or 0
+        return self.witness.u * float(self.initial * self.left + self.floor + drift) * MORE + LEAST
+
+    def decay(self, case: LateCase, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return ``e^(-b s_c)``, and what leaders that move and disturbances add in the bracket, (M,) floats each."""
+        b, added = float(self.witness.b), np.zeros(t.shape)
+        if case.leaders is not None:
+            push = float(case.leaders.total) / float(self.witness.u.min())
+            added = push * drift_integral(case.protocol.gain, b, case.least_cap(self.cap), t)
+        return np.exp(-b * case.limited(self.cap).clock(t)), added
+
+    def deviation_bound(self, case: LateCase, t: np.ndarray) -> np.ndarray:
+        """Return what bounds ``|x_k - x_k*|`` of followers at instants, ``(F, M)`` floats."""
+        y, added = self.decay(case, t)
+        return self.witness.u[:, None] * (float(self.initial) * y + (float(self.floor) + added)) * MORE
+
+    def highest_floor(self, case: LateCase) -> Fraction:
+        """Return what errors of values, leaders that move and disturbances add at most up to ``T``."""
+        return self.floor + (self.after or 0) * case.exact.least_gain(always=True) / case.exact.least_gain()
+
+    def inputs(self, case: LateCase, rows: FollowerRows) -> np.ndarray:
+        """Bound ``gain (D_k |eps_k| + sum_l |w_kl| |eps_l(t - tau_kl)| + error D_k)`` of followers under a cap."""
+        cap, u, b = case.messages.gain_cap, self.witness.u, float_up(self.witness.b)
+        assert cap is not None
+        y = float_up(self.initial * case.highest(self.witness.b, self.cap))
+        wrong = (
+            float_up(cap * self.highest_floor(case)) * rows.largest(u) + float_up(cap * case.exact.wrong) * rows.weights
+        )
+        return ((2 * rows.weights - b * (1 - 1e-15)) * u * y + wrong) * MORE + LEAST
+
+
+def away(case: LateCase, rows: FollowerRows) -> np.ndarray:
+    """Bound ``|x_k(0) - x_k*|`` of every follower from above; 1 without a state.
+
+    Of many followers in floats with room for their rounding.
+    """
+    if case.initial_state is None or case.ends is None:
+        return np.ones(rows.D.size)
+    followers, state, ends = rows.followers.tolist(), case.initial_state, case.ends
+    if rows.D.size > SEARCHED_FOLLOWERS:
+        with suppress(OverflowError):
+            parts = ((state[v], *ends[v]) for v in followers)
+            x, mid, radius = np.array([[float(value) for value in part] for part in parts]).T
+            return np.asarray(np.abs(x - mid) + radius + (np.abs(x) + np.abs(mid) + radius) * 2.0**-50 + LEAST)
+    return np.array([float_up(abs(state[v] - ends[v][0]) + ends[v][1]) for v in followers])
+
+
+def search_rows(case: LateCase, rows: FollowerRows, first: np.ndarray) -> tuple[RowBound, ...]:
+    """Return the row bound that leaves least at ``T`` of those found, under a cap that of the least input, too.
+
+    Where leaders move that which leaves least after ``T``, too.
+
+    Parameters
+    ----------
+    case : LateCase
+    rows : FollowerRows
+        Those of the case.
+    first : (F,) array
+        ``|x_k(0) - x_k*|`` from above.
+    """
+    candidates: list[RowBound] = []
+
+    def offer(q: float, loss: float) -> None:
+        with suppress(LMIError):
+            witness = rows.witness(Fraction(round_to_bits(q, 24)), loss)
+            candidates.append(row_bound(case, rows, first, witness))
+
+    small = rows.D.size <= SEARCHED_FOLLOWERS
+    with suppress(LMIError):  # the equations of the followers are too ill-conditioned for floats
+        if not case.messages.age:
+            for loss in _LOSSES[: None if small else 1]:
+                offer(1.0, loss)
+        else:
+            best_q = 1.0 if small else _best_q(case, rows)
+            if small:
+                most = min(rows.largest_q(), _LARGEST_Q)
+                for q in _grid(most, _TRIED):
+                    offer(float(q), _LOSSES[0])
+                best_q = float(min(candidates, key=_largest).witness.q) if candidates else 1.0
+            for loss in _LOSSES[1:]:  # a q of 1 serves no delay
+                offer(best_q, loss)
+    if not candidates:
+        return ()
+    chosen = [min(candidates, key=_largest)]
+    if case.messages.gain_cap is not None:
+        chosen.append(min(candidates, key=lambda row: float(row.inputs(case, rows).max())))
+    if case.leaders is not None:
+        chosen.append(min(candidates, key=lambda row: float(row.residual(after=True).max())))
+    return tuple(dict.fromkeys(chosen))
+
+
+def _largest(bound: RowBound) -> float:
+    return float(bound.residual().max())
+
+
+def _grid(most: float, count: int) -> np.ndarray:
+    """Return values of ``q`` between 1 and the largest one, denser near to 1."""
+    return np.asarray(np.exp(math.log(most) * np.linspace(0, 1, count + 2)[1:-1] ** 2))
+
+
+def _best_q(case: LateCase, rows: FollowerRows) -> float:
+    """Return the ``q`` that leaves least by the vector for ``q = 1``."""
+    witness, gain = rows.witness(Fraction(1), _LOSSES[1]), case.protocol.gain
+    share = float(rows.share(witness.u).max())
+    top = min(_LARGEST_Q, 1 / share if share else _LARGEST_Q)
+    best, least = 1 + (top - 1) / 2, 0.0
+    for q in _grid(top, 58):
+        b = rows.decay(witness, float(q))
+        if b > 0:
+            cap = Fraction(math.log(q) / (b * float(case.messages.age)))
+            value = -b * float(case.limited(cap).clock([float(gain.T)])[0])
+            best, least = (float(q), value) if value < least else (best, least)
+    return best
+
+
+def row_bound(case: LateCase, rows: FollowerRows, first: np.ndarray, witness: RowWitness) -> RowBound:
+    """Return what a witness proves.
+
+    Raises
+    ------
+    NoCertificate
+        ``q`` is 1, which serves no delay.
+    """
+    cap, age = None, case.messages.age
+    if age:
+        if witness.q <= 1:
+            raise NoCertificate("q = 1 serves no delay")
+        cap = rounded(log(witness.q)[0] / (witness.b * age), BITS)
+    floor = max(rows.floor(witness.u, float(case.exact.wrong)), LEAST) if case.exact.wrong else 0.0
+    initial = Fraction(float((first / witness.u).max()) * MORE)
+    row = RowBound(witness, cap, case.clock(cap), case.left(witness.b, cap), initial, Fraction(floor * MORE))
+    if case.leaders is None:
+        return row
+    push = case.leaders.total / Fraction(float(witness.u.min()))
+    drift = push * drift_above(case.protocol.gain.exact, witness.b, case.least_cap(cap))
+    flattest = Fraction(float((1 / rows.slack(witness.u)).max()) * MORE)
+    after = flattest * case.leaders.total / case.exact.least_gain(always=True)
+    return replace(row, drift=rounded(drift, BITS, up=True), after=rounded(after, BITS, up=True))
