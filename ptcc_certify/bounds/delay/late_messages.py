@@ -175,7 +175,7 @@ class LateBounds:
         if self.leaders is None:
             return None
         if self.vehicles is not None:
-            return self.vehicles.after(self)
+            return self.vehicles.after(self.case, self.rows)
         return min((float(row.residual(after=True).max()) for row in self.rows), default=None)
 
     @cached_property
@@ -211,7 +211,7 @@ class LateBounds:
         """Return what bounds ``|x_k - x_k*|`` at instants, of vehicles theirs, ``(F, M)`` floats; or infinite."""
         t = np.asarray(t, dtype=float)
         if self.vehicles is not None:
-            return self.vehicles.over_time(self, t)[0][self.followers]
+            return self.vehicles.over_time(self.case, self.rows, t)[0][self.followers]
         least = np.full((self.followers.size, t.size), np.inf)
         bounds = [one.deviation_bound(self.case, t) for one in self.of_followers]
         bounds += [one.deviation_bound(self.case, t)[self.followers] for one in self.of_all]
@@ -221,7 +221,7 @@ class LateBounds:
         """Return what bounds the largest ``|x_k - x_k*|`` of all agents at instants, ``(M,)`` floats."""
         t = np.asarray(t, dtype=float)
         if self.vehicles is not None:  # leaders that have a velocity move, too
-            return np.asarray(self.vehicles.over_time(self, t)[0].max(axis=0))
+            return np.asarray(self.vehicles.over_time(self.case, self.rows, t)[0].max(axis=0))
         whole = [one.deviation_bound(self.case, t) for one in self.of_all]
         return np.asarray((np.minimum.reduce(whole) if whole else self.deviation_bound(t)).max(axis=0))
 
@@ -262,7 +262,7 @@ def bound_late(case: LateCase) -> LateBounds:
     inputs = [] if messages.gain_cap is None else [row.inputs(case, rows) for row in found]
     bounds = replace(bounds, rows=found, steps=steps, residual=_least(rows, each), input=_least(rows, inputs))
     if messages.vehicles is not None:
-        return bound_vehicles(bounds, rows)
+        return replace(bounds, vehicles=bound_vehicles(case, found, rows))
     if not of_graph or messages.value_error or messages.gain_cap is not None or case.leaders is not None:
         return bounds
     missed = find_missed(case, rows.followers.tolist())
