@@ -14,11 +14,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_up, up
+from ptcc_certify.bounds.delay.case import LateCase
 from ptcc_certify.bounds.delay.decay_by_rows import RowBound
 from ptcc_certify.bounds.float_conversion import floats_up
 from ptcc_certify.checker.side_files import Numbers
@@ -27,9 +28,6 @@ from ptcc_certify.checker.virtual_positions import VehiclesSection, coefficients
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.lyapunov.follower_rows import FollowerRows
-
-if TYPE_CHECKING:
-    from ptcc_certify.bounds.delay.late_messages import LateBounds
 
 #: How many times faster vehicles track than the virtual states decay.
 FASTER = 2
@@ -61,18 +59,16 @@ class VehicleBounds:
     velocity: np.ndarray | None
     input: np.ndarray | None
 
-    def over_time(self, late: LateBounds, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def over_time(self, case: LateCase, rows: Sequence[RowBound], t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return what bounds positions and velocities of all agents at instants up to ``T``, ``(N, M)`` floats."""
-        chosen, a1 = late.followers, float(self.a1)
+        chosen, a1 = case.followers, float(self.a1)
         speed = np.array([float(abs(x)) for x in self.v0])[:, None]
         with np.errstate(divide="ignore"):  # without a cap the gain is infinite at T
-            g = late.gain.value(t)
-        first = float(late.case.exact.least_gain())
+            g = case.limited().value(t)
+        first = float(case.exact.least_gain())
         position, velocity = (np.full((speed.size, len(t)), np.inf) for _ in range(2))
-        for row in late.rows:
-            if not self._tracks(row):
-                continue
-            (y, added), b = row.decay(late.case, t), float(row.witness.b)
+        for row in filter(self._tracks, rows):
+            (y, added), b = row.decay(case, t), float(row.witness.b)
             u, lag, floor = np.zeros((speed.size, 1)), 1 / (a1 - b), float(row.floor)
             u[chosen, 0] = row.witness.u
             decaying = float(row.initial) * y + added
@@ -82,27 +78,27 @@ class VehicleBounds:
             position = np.minimum(position, own * _MORE + least)
             with np.errstate(invalid="ignore"):
                 velocity = np.minimum(velocity, a1 * g * (own + ahead) * _MORE + least)
-        if late.leaders is not None:  # which move as they like
+        if case.leaders is not None:  # which move as they like
             others = np.setdiff1d(np.arange(speed.size), chosen)
             position[others] = velocity[others] = 0
         return position, velocity
 
-    def after(self, late: LateBounds) -> float | None:
+    def after(self, case: LateCase, rows: Sequence[RowBound]) -> float | None:
         """Return what bounds ``|x_k - x*_k|`` from ``T`` on under a cap; None where nothing does.
 
         With ``C <= after`` at all times ``|x_k - x*_k|`` is at most ``u_k (a_1 M y/(a_1 - b) + floor + after)``, what
         the initial velocity adds, and ``speed/(a_1 g)``, what a vehicle lags behind a target that moves: with ``g =
         g(0)``, or from ``T`` on with the cap if it is less than that at ``T``.
         """
-        cap, leaders = late.messages.gain_cap, late.leaders
+        cap, leaders = case.messages.gain_cap, case.leaders
         if cap is None or leaders is None:
             return None
-        messages, at_T = late.case.exact, self.position
+        messages, at_T = case.exact, self.position
         early, lasting = (float_up(leaders.speed / (self.a1 * g)) for g in (messages.least_gain(), cap))
         found = []
-        for row in filter(self._tracks, late.rows):
-            decay = _decay(late, replace(row, floor=row.floor + (row.after or 0)), None)
-            bound = _meet(late, row, coefficients(messages, decay, self.a1, self.a2)[0], self.v0)
+        for row in filter(self._tracks, rows):
+            decay = _decay(case, replace(row, floor=row.floor + (row.after or 0)), None)
+            bound = _meet(case, row, coefficients(messages, decay, self.a1, self.a2)[0], self.v0)
             found += [(bound + early).max(), np.maximum(bound + lasting, at_T).max()]
         return float(min(found)) * _MORE
 
@@ -111,8 +107,8 @@ class VehicleBounds:
         return row.witness.b < self.a1 and row.witness.b <= self.a2
 
 
-def bound_vehicles(late: LateBounds, rows: FollowerRows) -> LateBounds:
-    """Add what holds of vehicles that track virtual states to LateBounds, in which bounds by rows are proved.
+def bound_vehicles(case: LateCase, found: Sequence[RowBound], rows: FollowerRows) -> VehicleBounds | None:
+    """Return what holds of vehicles that track virtual states, of which some bounds by rows are proved.
 
     Raises
     ------
@@ -121,7 +117,6 @@ def bound_vehicles(late: LateBounds, rows: FollowerRows) -> LateBounds:
 
     Examples
     --------
-    >>> from ptcc_certify.bounds.delay.case import LateCase
     >>> from ptcc_certify.bounds.delay.late_messages import bound_late
     >>> from ptcc_certify.model.virtual_positions import Vehicles
     >>> structure = analyse(SignedDigraph.from_edges([(1, 2, 1)]))
@@ -131,35 +126,35 @@ def bound_vehicles(late: LateBounds, rows: FollowerRows) -> LateBounds:
     >>> bounds.vehicles.position.max() < 0.01, bounds.vehicles.velocity.max() < 100
     (np.True_, np.True_)
     """
-    vehicles = late.messages.vehicles
+    vehicles = case.messages.vehicles
     assert vehicles is not None
-    chosen = set(late.followers.tolist())
-    if late.leaders is not None:
+    chosen = set(case.followers.tolist())
+    if case.leaders is not None:
         moving = next((v for v, x in enumerate(vehicles.v0) if x and v not in chosen), None)
         if moving is not None:
-            name = shorten(late.labels[moving])
+            name = shorten(case.of.labels[moving])
             raise ParameterError("v0", f"of {name} is not 0, a leader that moves as it likes here; give it 0")
-    if not late.rows:
-        return late
-    a = Fraction(up(FASTER * max(row.witness.b for row in late.rows), 3))
+    if not found:
+        return None
+    a = Fraction(up(FASTER * max(row.witness.b for row in found), 3))
     each = []
-    for row in late.rows:
+    for row in found:
         weights = rows.largest(row.witness.u), rows.weights
-        terms = coefficients(late.case.exact, _decay(late, row, row.drift), a, a)
-        each.append([_meet(late, row, one, vehicles.v0, *weights) for one in terms])
+        terms = coefficients(case.exact, _decay(case, row, row.drift), a, a)
+        each.append([_meet(case, row, one, vehicles.v0, *weights) for one in terms])
     position, *capped = (np.minimum.reduce(bounds) for bounds in zip(*each, strict=True))
     velocity, push = capped or (None, None)
-    return replace(late, vehicles=VehicleBounds(a, a, vehicles.v0, position, velocity, push))
+    return VehicleBounds(a, a, vehicles.v0, position, velocity, push)
 
 
-def _decay(late: LateBounds, row: RowBound, drift: Fraction | None) -> Decay:
+def _decay(case: LateCase, row: RowBound, drift: Fraction | None) -> Decay:
     """Return the decay of a row; ``drift`` is what leaders that move add."""
-    highest = row.highest_floor(late.case)
+    highest = row.highest_floor(case)
     return Decay(row.witness.b, row.cap, row.left, row.initial, row.floor, drift or Fraction(0), highest)
 
 
 def _meet(
-    late: LateBounds,
+    case: LateCase,
     row: RowBound,
     terms: Sequence[Fraction],
     v0: Sequence[Fraction],
@@ -170,7 +165,7 @@ def _meet(
     by_velocity, by_u, by_pull, by_degree, by_error = (float_up(x) for x in terms)
     bound = by_velocity * np.array([float(abs(x)) for x in v0]) * _MORE
     u = row.witness.u
-    bound[late.followers] += u * by_u + (pulled * by_pull + degrees * u * by_degree + degrees * by_error) * _MORE
+    bound[case.followers] += u * by_u + (pulled * by_pull + degrees * u * by_degree + degrees * by_error) * _MORE
     return np.asarray(bound * _MORE + np.where(bound > 0, _LEAST, 0))
 
 

@@ -169,12 +169,15 @@ def test_every_combination_is_proved_checked_with_and_without_arrays_and_read_ba
     assert "late-vehicles" in {step["kind"] for step in data["proof"]}
     assert false_claims(data) == []
     certificate.save(tmp_path / "c.json")
-    again, vehicles = read_certificate(tmp_path / "c.json").late, certificate.late.vehicles
+    again, made = read_certificate(tmp_path / "c.json").late, certificate.late
+    vehicles = made.vehicles
     for key in ("a1", "a2", "v0"):
         assert getattr(again.vehicles, key) == getattr(vehicles, key)
     assert np.array_equal(again.vehicles.position, vehicles.position)
     t = np.array([0.5, 0.9, 0.99])
-    for one, other in zip(again.vehicles.over_time(again, t), vehicles.over_time(certificate.late, t), strict=True):
+    for one, other in zip(
+        again.vehicles.over_time(again.case, again.rows, t), vehicles.over_time(made.case, made.rows, t), strict=True
+    ):
         assert one == pytest.approx(other)
 
 
@@ -198,7 +201,7 @@ def test_no_run_exceeds_a_bound(seed: int, name: str):
     ends = np.asarray(certificate.final_state, dtype=float)[:, None]
     for run in (follow(one, tracking, v0) for one in runs):
         before = run.t < 0.999
-        position, _ = late.vehicles.over_time(late, run.t[before])
+        position, _ = late.vehicles.over_time(late.case, late.rows, run.t[before])
         off = np.abs(run.states - (ends if run.targets is None else run.targets))
         assert (off[:, before] <= position * (1 + 1e-6) + 1e-6)[moved].all()
         at_T = int(np.argmax(run.remaining == 0))
@@ -272,7 +275,8 @@ def test_vehicles_that_begin_on_their_targets_with_a_velocity_are_bounded():
     graph, initial = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 2)]), InitialState([1, 1, 1], v0=[0, 3, 0])
     limits = GainLimits(gain_cap=20)
     certificate = certify(graph, NominalProtocol(rho2=3), initial, agents=VIRTUAL, limits=limits)
-    position, velocity = certificate.late.vehicles.over_time(certificate.late, np.array([0.0, 0.1]))
+    late = certificate.late
+    position, velocity = late.vehicles.over_time(late.case, late.rows, np.array([0.0, 0.1]))
     assert position[1].min() > 0.01 and velocity[1, 0] >= 3
     assert position[2].max() < 1e-200 and certificate.checked.accepted
 

@@ -131,14 +131,19 @@ class LateBounds:
         return self.case.followers
 
     @property
-    def over_time(self) -> list[RowBound | Steps | Settling | DelayLMIBound]:
-        """What bounds deviations at every instant up to ``T``."""
-        return [*self.rows, *(one for one in (self.steps, self.settling, self.lmi) if one is not None)]
+    def of_followers(self) -> list[RowBound | Steps]:
+        """What bounds deviations of followers at every instant up to ``T``; of leaders there are none."""
+        return [*self.rows, *(() if self.steps is None else (self.steps,))]
+
+    @property
+    def of_all(self) -> list[Settling | DelayLMIBound]:
+        """What bounds deviations of all agents at every instant up to ``T``."""
+        return [one for one in (self.settling, self.lmi) if one is not None]
 
     @property
     def says_something(self) -> bool:
         """Whether anything is proved."""
-        return bool(self.over_time or self.form or self.missed or self.staged)
+        return bool(self.of_followers or self.of_all or self.form or self.missed or self.staged)
 
     @property
     def residuals(self) -> list[np.ndarray]:
@@ -160,12 +165,17 @@ class LateBounds:
         return f"LateBounds({self.messages!r}: {within} at T)"
 
     @property
+    def unarrived(self) -> bool:
+        """Whether deadlines of stages fail since information takes longer than ``T`` to come from leaders to all."""
+        return self.staged == ()
+
+    @property
     def after(self) -> float | None:
         """What bounds ``|x_k - x_k*|`` from ``T`` on where leaders move; None where they rest."""
         if self.leaders is None:
             return None
         if self.vehicles is not None:
-            return self.vehicles.after(self)
+            return self.vehicles.after(self.case, self.rows)
         return min((float(row.residual(after=True).max()) for row in self.rows), default=None)
 
     @cached_property
@@ -175,7 +185,7 @@ class LateBounds:
         What no decay takes away obeys ``D_k y_k >= sum_l |w_kl| y_l + speed age D_k`` in every member, by rows as from
         instant to instant, and is above the least such ``y``. By rows more stays, how much depends on those found.
         """
-        if self.leaders is None or not self.messages.age or not (self.rows or self.steps):
+        if self.leaders is None or not self.messages.age or not self.of_followers:
             return None
         error = float(self.leaders.speed * self.messages.age)
         return float(late_rows(self.case).kept_off(error).max()) / MORE
@@ -201,19 +211,18 @@ class LateBounds:
         """Return what bounds ``|x_k - x_k*|`` at instants, of vehicles theirs, ``(F, M)`` floats; or infinite."""
         t = np.asarray(t, dtype=float)
         if self.vehicles is not None:
-            return self.vehicles.over_time(self, t)[0][self.followers]
+            return self.vehicles.over_time(self.case, self.rows, t)[0][self.followers]
         least = np.full((self.followers.size, t.size), np.inf)
-        for one in self.over_time:
-            bound = one.deviation_bound(self.case, t)
-            least = np.minimum(least, bound if len(bound) == len(least) else bound[self.followers])
-        return least
+        bounds = [one.deviation_bound(self.case, t) for one in self.of_followers]
+        bounds += [one.deviation_bound(self.case, t)[self.followers] for one in self.of_all]
+        return np.asarray(np.minimum.reduce([least, *bounds]))
 
     def largest_bound(self, t: Sequence[float] | np.ndarray) -> np.ndarray:
         """Return what bounds the largest ``|x_k - x_k*|`` of all agents at instants, ``(M,)`` floats."""
         t = np.asarray(t, dtype=float)
         if self.vehicles is not None:  # leaders that have a velocity move, too
-            return np.asarray(self.vehicles.over_time(self, t)[0].max(axis=0))
-        whole = [one.deviation_bound(self.case, t) for one in (self.settling, self.lmi) if one is not None]
+            return np.asarray(self.vehicles.over_time(self.case, self.rows, t)[0].max(axis=0))
+        whole = [one.deviation_bound(self.case, t) for one in self.of_all]
         return np.asarray((np.minimum.reduce(whole) if whole else self.deviation_bound(t)).max(axis=0))
 
 
@@ -253,7 +262,7 @@ def bound_late(case: LateCase) -> LateBounds:
     inputs = [] if messages.gain_cap is None else [row.inputs(case, rows) for row in found]
     bounds = replace(bounds, rows=found, steps=steps, residual=_least(rows, each), input=_least(rows, inputs))
     if messages.vehicles is not None:
-        return bound_vehicles(bounds, rows)
+        return replace(bounds, vehicles=bound_vehicles(case, found, rows))
     if not of_graph or messages.value_error or messages.gain_cap is not None or case.leaders is not None:
         return bounds
     missed = find_missed(case, rows.followers.tolist())

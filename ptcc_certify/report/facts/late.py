@@ -39,7 +39,7 @@ def late_facts(certificate: Certificate) -> Facts:
     if late.leaders is not None:
         yield Fact(head="leaders", note=leaders_text(late.leaders))
     told = [*_impossible(late), *([] if late.direct else _left(late)), *_stages(late), *_kept_off(late)]
-    if (at := certificate.at) is not None and late.over_time:
+    if (at := certificate.at) is not None and (late.of_followers or late.of_all):
         bound = float(late.largest_bound([float(at)])[0])
         note = f"at t = {near(at)} every agent within {up(bound, 2)}"
         told.append(Fact(head="late", value=bound, side="up", note=note))
@@ -75,7 +75,7 @@ def _vehicles(late: LateBounds) -> Facts:
     gains = "a_1 = a_2" if proved.a1 == proved.a2 else f"a_1 = {near(proved.a1)}, a_2"
     yield Fact(head="agents", note=f"{text}, and track them: {gains} = {near(proved.a2)}")
     shares, percent = (0.5, 0.9, 0.99), np.arange(1, 100)  # drives are summed up from instant to instant
-    over_time = proved.over_time(late, float(late.gain.gain.T) * percent / 100)
+    over_time = proved.over_time(late.case, late.rows, float(late.gain.gain.T) * percent / 100)
     position, velocity = (bounds[:, np.isin(percent, (50, 90, 99))] for bounds in over_time)
     whole = FROM_WITHIN_1 if late.relative else ""
     for name, bounds in (("deviations", position), ("velocities", velocity)):
@@ -247,7 +247,7 @@ def _limit_text(late: LateBounds) -> str:
 
 def _stages(late: LateBounds) -> Facts:
     """Tell the deadlines of stages, at which agents are at their final states exactly."""
-    if late.staged == ():
+    if late.unarrived:
         note = "no deadlines of stages: information takes longer than T from the leaders to the last agent"
         yield Fact(head="late", note=note)
     elif late.direct:

@@ -90,9 +90,7 @@ def plot_tracking(subject: Any, *, ax: Axes | None = None, time_unit: str = "") 
 def _draw_runs(ax: Axes, certificate: Certificate, late: LateBounds | None, start: list[float]) -> np.ndarray:
     """Draw the runs of one graph; return their instants."""
     nodes, ends = certificate.graph_proof.structure.followers, np.asarray(certificate.proof.final_state, dtype=float)
-    if not nodes.size or (
-        late is not None and (late.vehicles is not None or late.settling is not None or late.lmi is not None)
-    ):
+    if not nodes.size or (late is not None and (late.vehicles is not None or late.of_all)):
         nodes = np.arange(certificate.graph_proof.graph.n_nodes)
     t = np.linspace(0, float(certificate.protocol.T), 401)
     for run, style in _runs(certificate, late, certificate.proof.tracking, start):
@@ -125,7 +123,7 @@ def _runs(
 def _draw_late_bound(ax: Axes, late: LateBounds, t: np.ndarray) -> None:
     """Draw what is proved with late messages, and what is the least that a bound can be."""
     ax.set_yscale("log")
-    if late.over_time:
+    if late.of_followers or late.of_all:
         over_time = late.largest_bound(t)
         ax.plot(t, over_time, color=BOUND, linewidth=1.8, label="proved bound")
         nearer = bool(late.largest < _NEARER * over_time[-1])
