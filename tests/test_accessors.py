@@ -20,6 +20,10 @@ def certify(**options: Any) -> Any:
     return certify_words(GRAPH, PROTOCOL, X0, method="paper", **options)
 
 
+def values_of(run: Any) -> Callable[[Any], Any]:
+    return lambda agent: run[agent].tolist()
+
+
 BY_PLACE_TOO: dict[str, Callable[[], Callable[[Any], Any]]] = {
     "influence": lambda: ptcc.influence(GRAPH).row,
     "influence of a certificate": lambda: certify().influence.row,
@@ -29,13 +33,11 @@ BY_PLACE_TOO: dict[str, Callable[[], Callable[[Any], Any]]] = {
 }
 BY_LABEL: dict[str, Callable[[], Callable[[Any], Any]]] = {
     "final state": lambda: certify().final_state.__getitem__,
-    "run": lambda: lambda agent: certify().trajectory[agent].tolist(),
-    "run of a family": lambda: lambda agent: ptcc.simulate(FAMILY, PROTOCOL, X0)[agent].tolist(),
-    "run of agents of order n": lambda: (
-        lambda agent: certify(agents=ptcc.Agents(order=2)).agents.simulate(samples=5)[agent].tolist()
-    ),
-    "run with late messages": lambda: (
-        lambda agent: ptcc.simulate_late(GRAPH, PROTOCOL, ptcc.LateMessages(delay="0.1"), X0)[agent].tolist()
+    "run": lambda: values_of(certify().trajectory),
+    "run of a family": lambda: values_of(ptcc.simulate(FAMILY, PROTOCOL, X0)),
+    "run of agents of order n": lambda: values_of(certify(agents=ptcc.Agents(order=2)).agents.simulate(samples=5)),
+    "run with late messages": lambda: values_of(
+        ptcc.simulate_late(GRAPH, PROTOCOL, ptcc.LateMessages(delay="0.1"), X0)
     ),
 }
 

@@ -25,13 +25,21 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 #: Blocks of commands, each run from top to bottom in one folder as a reader would; those that set up are CI's own.
 SESSIONS = [block for _, block in blocks(TEXT, "sh") if "ptcc " in block and "pip install" not in block]
 #: Commands with a test of their own. The first costs as much as all others: tests/cli, test_all_examples_behave_*; the
-#: second ends at Ctrl-C only: tests/report/test_explorer_page.py, test_ctrl_c_ends_the_explorer_at_once_*.
-RUN_ELSEWHERE = {"ptcc examples all -o figures", "ptcc explore fig3a"}
+#: second ends at Ctrl-C only: tests/report/test_explorer_page.py, test_ctrl_c_ends_the_explorer_at_once_*; the
+#: third starts a process for each core: tests/batch, test_a_process_that_*; here it runs in this one.
+RUN_ELSEWHERE = {"ptcc examples all -o figures", "ptcc explore fig3a", "ptcc batch ensemble.toml -o table.csv"}
 
 
 @pytest.mark.parametrize("session", SESSIONS, ids=lambda text: text.splitlines()[0][:30])
 def test_commands_run(session: str, folder: Path):
     run_commands(session, folder, RUN_ELSEWHERE)
+
+
+def test_the_batch_runs(folder: Path):
+    lines = next(session for session in SESSIONS if "ptcc batch" in session).splitlines()
+    (spec,) = [line for line in lines if line.endswith("> ensemble.toml")]
+    (command,) = [line for line in lines if line.startswith("ptcc batch ")]
+    run_commands(f"{spec}\n{command.partition('#')[0]} --workers 1", folder)
 
 
 def test_there_are_commands():

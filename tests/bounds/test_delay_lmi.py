@@ -84,6 +84,7 @@ def test_the_longest_delay_for_a_wanted_residual_is_sought_by_it_too() -> None:
     assert longest.largest <= 1
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("seed", range(8))
 def test_no_delay_is_forgiven_at_which_a_constant_gain_diverges(seed: int) -> None:
     graph, _ = grouped_graph(np.random.default_rng(seed), 1 + seed % 3)

@@ -198,14 +198,15 @@ def test_followers_track_leaders_that_move_and_the_file_says_so() -> None:
     assert "ever after" in sign.out
 
 
+@pytest.mark.few(3)  # one of each option
 @pytest.mark.parametrize(
     ("rows", "words"),
     [
         ("a,b,0,0.9\na,b,-2,0.0001", ("--drop-zeros",)),
-        ("a,b,-2,0.0001\na,b,0,0.9", ("--drop-zeros",)),
         ("a,b,-2,0.9\na,b,-2,0.0001", ("--duplicates", "last")),
-        ("a,b,0,0.9\na,b,-2,0.9\na,b,-2,0.0001", ("--duplicates", "last", "--drop-zeros")),
+        ("a,b,-2,0.0001\na,b,0,0.9", ("--drop-zeros",)),
         ("a,b,-2,0.0001\nb,b,1,0.9", ("--drop-self-loops",)),
+        ("a,b,0,0.9\na,b,-2,0.9\na,b,-2,0.0001", ("--duplicates", "last", "--drop-zeros")),
     ],
 )
 def test_the_delay_of_a_row_that_was_dropped_is_dropped_with_it(rows: str, words: tuple[str, ...]) -> None:

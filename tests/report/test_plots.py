@@ -233,7 +233,7 @@ def test_of_a_certificate_under_limits_the_run_under_them_is_drawn_and_they_are_
     held, capped = GainLimits(sample_period="0.01"), GainLimits(gain_cap="0.5")
     titles = {}
     for name, limits in {"held": [held], "capped": [capped], "both": [held, capped]}.items():
-        cert = certify(graph, EXAMPLES[2].protocol(), start, limits=limits)
+        cert = certify(graph, EXAMPLES[2].protocol(), start, limits=limits, asks=Asks(method="paper"))
         ax = drawn(plot_input(cert))
         legend = ax.get_legend()
         assert legend is not None and cert.trajectory is not None

@@ -451,7 +451,7 @@ def test_the_heading_names_the_sharpest_claim(tmp_path: Path):
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
     for agents, told in ((None, "Consensus at T"), (Agents(order=2), "Consensus of double integrators")):
         made = certify(allies, protocol, [1, 2, 3], agents=agents, asks=Asks(method="paper", simulation=False))
-        assert f"<h1>{told}" in reported(made, tmp_path)
+        assert f"<h1>{told}" in reported(made, tmp_path, simulation=False)
 
 
 def test_a_long_deadline_is_plain_in_the_title(tmp_path: Path):
