@@ -20,7 +20,7 @@ from scipy.linalg import expm
 
 from ptcc_certify import NominalProtocol, SignedDigraph, analyse, certify, read_graph
 from ptcc_certify.bounds.input.effort import Effort
-from ptcc_certify.bounds.input.initial_set import initial_set_within
+from ptcc_certify.bounds.input.initial_sets import initial_set_within
 from ptcc_certify.bounds.input.worst_initial_state import worst_initial_state
 from ptcc_certify.errors import PTCCError
 from ptcc_certify.examples import EXAMPLES, GRAPHS, load_graph

@@ -22,7 +22,7 @@ import numpy as np
 
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.graphs.weights import Weights
+from ptcc_certify.graphs.packed_weights import Weights
 from ptcc_certify.lyapunov.family_rows import follower_decay, least_rate
 from ptcc_certify.lyapunov.interval_rows import IntervalRows
 from ptcc_certify.model import NominalProtocol

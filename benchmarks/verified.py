@@ -29,7 +29,7 @@ from scale import generated
 
 import ptcc_certify as ptcc
 from ptcc_certify.certificate.certification import certify
-from ptcc_certify.cli.verified import executable
+from ptcc_certify.cli.proved_checker import executable
 from ptcc_certify.examples import load_graph
 from ptcc_certify.model.asks import Asks
 

@@ -23,7 +23,7 @@ import pytest
 from hypothesis import strategies as st
 
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.weights import Weights
+from ptcc_certify.graphs.packed_weights import Weights
 
 Rng = np.random.Generator
 Pair = tuple[int, int]  # (source, target)

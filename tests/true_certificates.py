@@ -15,7 +15,7 @@ from mutations import Json
 from side_files import with_factors, with_side_files
 
 from ptcc_certify.bounds.final_state import of_graph as final_states
-from ptcc_certify.bounds.input.initial_set import box, ellipsoid
+from ptcc_certify.bounds.input.initial_sets import box, ellipsoid
 from ptcc_certify.certificate import graph_certification
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.graphs.digraph import SignedDigraph

@@ -10,7 +10,7 @@ from sphinx.application import Sphinx
 from sphinx.util import logging
 from ziamath.tex import tex2mml
 
-from ptcc_certify.report.notation import formula_svg
+from ptcc_certify.report.html_text import formula_svg
 
 
 def formula(page: Any, node: nodes.Element, inline: bool) -> str:

@@ -20,8 +20,8 @@ from ptcc_certify.batch.rows import COLUMNS, Row, package_version, printable
 from ptcc_certify.batch.settings import INSTALL, Settings
 from ptcc_certify.batch.sources import Source
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.labels import import_pandas
 from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.graphs.tables import import_pandas
 
 if TYPE_CHECKING:
     import pandas as pd

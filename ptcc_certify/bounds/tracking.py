@@ -22,11 +22,11 @@ from lmi.exact.decimal_rounding import float_up, up
 from ptcc_certify.bounds.float_conversion import floats, floats_up
 from ptcc_certify.checker.leaders import LeadersAsked, LeadersSection
 from ptcc_certify.checker.obligations import CheckReport
-from ptcc_certify.checker.sections import RowVector
+from ptcc_certify.checker.section_declarations import RowVector
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
+from ptcc_certify.lyapunov.late_follower_rows import FollowerRows, RowWitness
 from ptcc_certify.model.base import Protocol
 from ptcc_certify.model.gain import Gain
 from ptcc_certify.model.moving_leaders import MovingLeaders

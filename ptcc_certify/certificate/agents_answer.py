@@ -14,14 +14,14 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import down, float_up, near, up
 from lmi.exact.elementary_enclosures import sqrt
-from ptcc_certify.bounds.agents.comparison import AgentsComparison
+from ptcc_certify.bounds.agents.common_motion import Interval
 from ptcc_certify.bounds.agents.each_agent import States, error_constants, first_inputs, scaled_states
-from ptcc_certify.bounds.agents.instants import Values
-from ptcc_certify.bounds.agents.motion import Interval
+from ptcc_certify.bounds.agents.halved_times import Values
+from ptcc_certify.bounds.agents.run_against_bounds import AgentsComparison
 from ptcc_certify.bounds.final_state.enclosed_ends import agents_ends, weighted_sum
 from ptcc_certify.bounds.final_state.of_graph import Influence, NotEnclosedError
 from ptcc_certify.bounds.float_conversion import fractions
-from ptcc_certify.certificate.exit_code import MET, OPEN, REFUTED, Answer
+from ptcc_certify.certificate.assessment import MET, OPEN, REFUTED, Answer
 from ptcc_certify.checker.agent_bounds import AgentsInput
 from ptcc_certify.checker.agent_cascade import CascadeSection
 from ptcc_certify.checker.agents import AgentsSection

@@ -15,7 +15,7 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import as_family, as_graph
 from ptcc_certify.graphs.io.conversion import is_family
-from ptcc_certify.graphs.io.initial_state import as_states, random_states
+from ptcc_certify.graphs.io.states import as_states, random_states
 from ptcc_certify.graphs.rationals import shorten, writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.model.agents import DERIVATIVES, MOST_DIMENSION, PLURALS, Agents

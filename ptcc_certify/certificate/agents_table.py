@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_down, float_up
-from ptcc_certify.certificate.constrained_switching.states import ends_for_signal
+from ptcc_certify.certificate.constrained_switching.final_states import ends_for_signal
 from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.checker.reading import Interval
-from ptcc_certify.graphs.tables import import_pandas
+from ptcc_certify.graphs.labels import import_pandas
 
 if TYPE_CHECKING:
     import pandas as pd

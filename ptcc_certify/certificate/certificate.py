@@ -18,12 +18,12 @@ from ptcc_certify.certificate.checking import read_and_check, refuse_no_certific
 from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.proof import Source
 from ptcc_certify.certificate.read_document import read_document
-from ptcc_certify.certificate.section_writer import read_side_files
+from ptcc_certify.certificate.section_io import read_side_files
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.errors import FormatError, gated
 from ptcc_certify.graphs.io.files import refuse_no_path
-from ptcc_certify.graphs.kinds_of_file import refuse_as_certificate
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.recognised_files import refuse_as_certificate
 
 if TYPE_CHECKING:
     import pandas as pd

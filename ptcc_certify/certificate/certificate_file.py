@@ -9,18 +9,18 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from ptcc_certify.certificate.assessment import Assessment, rejection, rejects, verdict_of
 from ptcc_certify.certificate.document import certificate_document
 from ptcc_certify.certificate.evidence import Evidence
-from ptcc_certify.certificate.exit_code import Assessment, rejection, rejects, verdict_of
-from ptcc_certify.certificate.facts import Fact
+from ptcc_certify.certificate.fact import Fact
 from ptcc_certify.certificate.proof import Source
 from ptcc_certify.certificate.verdict import assess
 from ptcc_certify.checker import CheckReport, VerifiedObligation
-from ptcc_certify.display import rendered
 from ptcc_certify.errors import ParameterError, PTCCError, gated
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.io.files import refuse_no_path
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.lazy_report import rendered
 
 
 class RejectedCertificate(PTCCError, ValueError):
@@ -182,7 +182,7 @@ class Recorded(Evidence):
         return "\n".join(rendered("screen.summary_lines", self))
 
     def facts(self) -> list[Fact]:
-        """Return everything that is told of it, as data: see :class:`~ptcc_certify.certificate.facts.Fact`.
+        """Return everything that is told of it, as data: see :class:`~ptcc_certify.certificate.fact.Fact`.
 
         Examples
         --------

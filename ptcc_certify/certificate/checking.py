@@ -16,8 +16,8 @@ from ptcc_certify.checker import CheckReport
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.graphs.kinds_of_file import refuse_as_certificate
 from ptcc_certify.graphs.rationals import number_within, shorten
+from ptcc_certify.graphs.recognised_files import refuse_as_certificate
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
 

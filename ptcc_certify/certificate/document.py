@@ -12,8 +12,8 @@ from ptcc_certify.bounds.delay.late_messages import late_obligations, messages_s
 from ptcc_certify.bounds.input.effort import EnergyIntegral, Peak, effort_section, peak_witness
 from ptcc_certify.bounds.tracking import leaders_section, tracking_obligations
 from ptcc_certify.certificate.checking import record
-from ptcc_certify.certificate.claim_sections import ball, claim_section, claim_steps
 from ptcc_certify.certificate.constrained_switching.claims import Claim
+from ptcc_certify.certificate.constrained_switching.sections import ball, claim_section, claim_steps
 from ptcc_certify.certificate.evidence import Evidence
 from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.final_state_sections import final_state_sections, formation_section
@@ -37,29 +37,29 @@ from ptcc_certify.certificate.graph_sections import (
     structure_section,
 )
 from ptcc_certify.certificate.proof import Proof
-from ptcc_certify.certificate.section_writer import Writer, write
-from ptcc_certify.certificate.unverified import write_unverified
+from ptcc_certify.certificate.section_io import Writer, write
+from ptcc_certify.certificate.unverified_section import write_unverified
 from ptcc_certify.checker import NOT_OF_FAMILIES, SCHEMA, SLIDING_BOUND, SLIDING_CLOCK
 from ptcc_certify.checker.agent_decrease import PhaseSection
 from ptcc_certify.checker.agent_instants import InstantsSection
 from ptcc_certify.checker.constrained_switching import Section
 from ptcc_certify.checker.family_bounds import FamilyInput
-from ptcc_certify.checker.family_limits import EQUAL
+from ptcc_certify.checker.family_ends import EQUAL
 from ptcc_certify.checker.family_rows import FamilyFunctionsSection
 from ptcc_certify.checker.final_state import FormationSection, InfluenceSection
 from ptcc_certify.checker.input import EnergyWitness, InputSection
+from ptcc_certify.checker.late_messages import MessagesSection
 from ptcc_certify.checker.leaders import LeadersSection
-from ptcc_certify.checker.messages import MessagesSection
 from ptcc_certify.checker.obligations import CheckReport
 from ptcc_certify.checker.protocol import ReachingTimes, SlidingPart
 from ptcc_certify.checker.rates import OvershootSection, RatesSection
-from ptcc_certify.checker.sections import Ball, ByAgent, Several
+from ptcc_certify.checker.section_declarations import Ball, ByAgent, Several
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.theorem_function import PaperSection
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.lyapunov.follower_rows import listeners
 from ptcc_certify.lyapunov.function import Dominance
+from ptcc_certify.lyapunov.late_follower_rows import listeners
 from ptcc_certify.model import Protocol
 from ptcc_certify.model.reaching_time import ReachingTime
 from ptcc_certify.theorems.theorem import Obligation

@@ -9,15 +9,15 @@ from typing import Any, Self
 
 import numpy as np
 
-from ptcc_certify.bounds.agents.comparison import AgentsComparison
+from ptcc_certify.bounds.agents.run_against_bounds import AgentsComparison
 from ptcc_certify.bounds.envelope import Comparison, remaining_part
 from ptcc_certify.bounds.final_state.of_graph import final_state
 from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.certificate.proof import OfQuestion
 from ptcc_certify.certificate.request import Question
-from ptcc_certify.display import Shown
 from ptcc_certify.errors import ParameterError, PTCCError, SimulationError, unknown_parameter
+from ptcc_certify.lazy_report import Shown
 from ptcc_certify.lyapunov.search import Search
 from ptcc_certify.model.disturbance import ExpressionDisturbance
 from ptcc_certify.model.gain_limits import GainLimits

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.numbers import integers
+from ptcc_certify.bounds.deviation.component_deviations import FunctionOf, UndrivenPart
 from ptcc_certify.bounds.deviation.heard import HeardRows
 from ptcc_certify.bounds.deviation.of_family import (
     RestStates,
@@ -21,11 +22,10 @@ from ptcc_certify.bounds.deviation.of_family import (
     input_while_driven,
     sliding_sizes,
 )
-from ptcc_certify.bounds.deviation.undriven_part import FunctionOf, UndrivenPart
 from ptcc_certify.bounds.envelope import Instants, remaining_part
 from ptcc_certify.bounds.final_state.attracting_box import AttractingBox
-from ptcc_certify.bounds.final_state.final_ends import FinalEnds
 from ptcc_certify.bounds.final_state.kept_means import LeadingGroup, leading_groups
+from ptcc_certify.bounds.final_state.labelled_ends import FinalEnds
 from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.certificate.constrained_switching.claims import (
     Claim,
@@ -38,8 +38,8 @@ from ptcc_certify.certificate.constrained_switching.claims import (
 from ptcc_certify.certificate.functions import ProvedFunction
 from ptcc_certify.certificate.proof import Proof
 from ptcc_certify.checker.family_bounds import deviations, ends_near, peaks
+from ptcc_certify.checker.family_ends import WeightedMean, agents_heard, limits
 from ptcc_certify.checker.family_function import Scaled
-from ptcc_certify.checker.family_limits import WeightedMean, agents_heard, limits
 from ptcc_certify.checker.family_sliding import Drive, last_time
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.checker.protocol import sliding_bounded, sliding_part

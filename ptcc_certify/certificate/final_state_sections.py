@@ -12,7 +12,7 @@ from ptcc_certify.bounds.final_state.enclosed_ends import agents_ends, influence
 from ptcc_certify.bounds.final_state.of_graph import FinalState, Influence, rounding_radius
 from ptcc_certify.bounds.float_conversion import numbers
 from ptcc_certify.certificate.graph_proof import GraphProof
-from ptcc_certify.certificate.section_writer import LONG, Writer, exact_or_ball, interval_text
+from ptcc_certify.certificate.section_io import LONG, Writer, exact_or_ball, interval_text
 from ptcc_certify.checker.final_state import FormationSection, InfluenceSection, LeftNullVector
 from ptcc_certify.checker.obligations import CheckReport
 from ptcc_certify.checker.reading import Interval, exact, interval

@@ -13,7 +13,7 @@ import numpy as np
 from lmi.exact.definite import SparseFactor
 from ptcc_certify.bounds.final_state.attracting_box import AttractingBox
 from ptcc_certify.certificate.graph_proof import GraphProof
-from ptcc_certify.certificate.section_writer import Reader, Writer, write
+from ptcc_certify.certificate.section_io import Reader, Writer, write
 from ptcc_certify.checker import attracting_boxes
 from ptcc_certify.checker.attracting_boxes import KeptBox
 from ptcc_certify.checker.dominance import FactorSection

@@ -36,9 +36,9 @@ from ptcc_certify.certificate.agents_part import AgentsPart, prove_agents, with_
 from ptcc_certify.certificate.agents_request import (
     Chains,
 )
+from ptcc_certify.certificate.assessment import rejects
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.evidence import Observations
-from ptcc_certify.certificate.exit_code import rejects
 from ptcc_certify.certificate.final_state_sections import stated_ends
 from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.certificate.proof import OfQuestion

@@ -28,7 +28,7 @@ from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.proof import Proof
 from ptcc_certify.checker import INPUT_NODES
 from ptcc_certify.checker.final_state import AgentsVector
-from ptcc_certify.checker.quadratic_form import Form
+from ptcc_certify.checker.lyapunov_form import Form
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.digraph import SignedDigraph

@@ -9,17 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from ptcc_certify.certificate.section_writer import Writer
+from ptcc_certify.certificate.section_io import Writer
 from ptcc_certify.checker import MANY_COMPONENTS
 from ptcc_certify.checker.family import THEOREM
 from ptcc_certify.checker.reading import exact
 from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, Mode
+from ptcc_certify.graphs.packed_weights import Weights
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.reading import RECORDED
 from ptcc_certify.graphs.structure import BIPARTITE_CONTAINMENT, INTERVAL_BIPARTITE_CONSENSUS, Structure, analyse
-from ptcc_certify.graphs.weights import Weights
 from ptcc_certify.theorems.claims import Claim
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 

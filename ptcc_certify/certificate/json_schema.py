@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from ptcc_certify.checker import OBLIGATIONS, SCHEMA
 from ptcc_certify.checker.contents import BRINGS, FamilyCertificate, GraphCertificate
-from ptcc_certify.checker.sections import Brings, Pattern, Rule, declared, outermost
+from ptcc_certify.checker.section_declarations import Brings, Pattern, Rule, declared, outermost
 from ptcc_certify.checker.side_files import Numbers
 
 Schema = dict[str, Any]

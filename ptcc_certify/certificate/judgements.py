@@ -10,12 +10,12 @@ from itertools import islice
 from typing import Any
 
 from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.bounds.delay.certain_misses import Missed
 from ptcc_certify.bounds.delay.late_messages import LateBounds
-from ptcc_certify.bounds.delay.missed_deadline import Missed
 from ptcc_certify.bounds.tracking import Tracking
+from ptcc_certify.certificate.assessment import MET, OPEN, REFUTED, Answer
 from ptcc_certify.certificate.constrained_switching.claims import LastModeClaim
 from ptcc_certify.certificate.constrained_switching.reasons import reasons_for_none
-from ptcc_certify.certificate.exit_code import MET, OPEN, REFUTED, Answer
 from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.errors import Change, Sentence, joined
@@ -25,7 +25,7 @@ from ptcc_certify.model.base import Protocol
 from ptcc_certify.model.constrained_switching import ClockShares, JointWindows
 from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
-from ptcc_certify.theorems.family_claims import component_holds, component_refutation
+from ptcc_certify.theorems.family_special_cases import component_holds, component_refutation
 from ptcc_certify.theorems.last_mode import last_mode_shows
 
 

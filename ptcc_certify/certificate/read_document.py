@@ -12,7 +12,7 @@ from ptcc_certify.bounds.float_conversion import fractions
 from ptcc_certify.bounds.input.effort import read_effort
 from ptcc_certify.bounds.tracking import read_tracking
 from ptcc_certify.certificate.agents_part import read_agents
-from ptcc_certify.certificate.claim_sections import read_claim
+from ptcc_certify.certificate.constrained_switching.sections import read_claim
 from ptcc_certify.certificate.evidence import Observations
 from ptcc_certify.certificate.family_proof import ComponentProof, FamilyProof
 from ptcc_certify.certificate.final_state_sections import read_final_state
@@ -21,8 +21,8 @@ from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.certificate.graph_sections import certificate_family, certificate_graph
 from ptcc_certify.certificate.proof import Source
 from ptcc_certify.certificate.request import Question
-from ptcc_certify.certificate.section_writer import Reader
-from ptcc_certify.certificate.unverified import (
+from ptcc_certify.certificate.section_io import Reader
+from ptcc_certify.certificate.unverified_section import (
     nothing_proved,
     read_observations,
     read_request,

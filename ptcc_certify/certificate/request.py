@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.numbers import MAX_SCALE_BITS
-from ptcc_certify.bounds.input.initial_set import read_initial_set
+from ptcc_certify.bounds.input.initial_sets import read_initial_set
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.errors import Change, NumberError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph

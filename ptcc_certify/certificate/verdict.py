@@ -8,8 +8,7 @@ to try next where nothing was decided; and which expectation was met, refuted or
 
 from __future__ import annotations
 
-from ptcc_certify.certificate.evidence import Evidence
-from ptcc_certify.certificate.exit_code import (
+from ptcc_certify.certificate.assessment import (
     CERTIFIED,
     OPEN,
     Assessment,
@@ -18,6 +17,7 @@ from ptcc_certify.certificate.exit_code import (
     standing,
     verdict_of,
 )
+from ptcc_certify.certificate.evidence import Evidence
 from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.judgements import judge
 from ptcc_certify.certificate.usefulness import Use, use_of

@@ -14,16 +14,16 @@ from lmi.exact.elementary_enclosures import exp, rounded
 from lmi.exact.numbers import integers, longest, shorten, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.agent_model import Agents
-from ptcc_certify.checker.agent_motion import States
+from ptcc_certify.checker.common_motion import States
 from ptcc_certify.checker.digraph import Digraph
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.final_state import FinalState
 from ptcc_certify.checker.input import Verified, check_constants
 from ptcc_certify.checker.input_formulas import Limits, root_above
 from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.checker.matrix_products import Matrix
-from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import need
-from ptcc_certify.checker.sections import ByAgent, FewAgents, NotNegative, Several
+from ptcc_certify.checker.section_declarations import ByAgent, FewAgents, NotNegative, Several
 from ptcc_certify.checker.side_files import Numbers
 
 #: Bits to which long numbers are rounded, upwards, before they bound every agent.

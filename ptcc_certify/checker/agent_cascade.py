@@ -15,14 +15,14 @@ from lmi.exact.work import spend
 from ptcc_certify.checker.agent_bounds import BITS, AgentsInput, Used, UsedSection, value_of, verify_used
 from ptcc_certify.checker.agent_instants import Halved, check_instants, halvings, largest_value
 from ptcc_certify.checker.agent_model import LARGEST_DIMENSION, LONGEST, Cascade, within
-from ptcc_certify.checker.agent_motion import States, check_ends, need_shape, sized_offsets
+from ptcc_certify.checker.common_motion import States, check_ends, need_shape, sized_offsets
 from ptcc_certify.checker.digraph import Digraph
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.checker.lyapunov import Function
-from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import length, need
-from ptcc_certify.checker.sections import Ball, ByAgent, Positive, Several
+from ptcc_certify.checker.section_declarations import Ball, ByAgent, Positive, Several
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,16 +8,16 @@ from fractions import Fraction
 from itertools import chain, pairwise
 
 from lmi.exact.decimal_rounding import down
-from lmi.exact.matrix_polynomials import nonnegative_between, semidefinite
+from lmi.exact.matrix_polynomial_sign import nonnegative_between, semidefinite
 from lmi.exact.numbers import integers, longest
 from lmi.exact.work import spend
 from ptcc_certify.checker.agent_bounds import Used
 from ptcc_certify.checker.agent_model import LONGEST, MANY_POINTS, Agents
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.checker.matrix_products import Matrix
-from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import length, need
-from ptcc_certify.checker.sections import Positive, Several, Triangle
+from ptcc_certify.checker.section_declarations import Positive, Several, Triangle
 
 Rows = list[list[Fraction]]
 #: Phases of all functions.

@@ -27,13 +27,13 @@ from lmi.exact.numbers import integers, longest
 from lmi.exact.work import spend
 from ptcc_certify.checker.agent_bounds import Begin, Weights
 from ptcc_certify.checker.agent_model import Agents, Cascade
-from ptcc_certify.checker.agent_motion import States
+from ptcc_certify.checker.common_motion import States
 from ptcc_certify.checker.digraph import Digraph
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.checker.lyapunov import Function
-from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, need
-from ptcc_certify.checker.sections import Several
+from ptcc_certify.checker.section_declarations import Several
 
 Columns = list[list[list[int]]]
 #: ``V`` of every function that is used, at most, at every instant; None: not told. Of the cascade two roots of each.

@@ -11,7 +11,7 @@ from lmi.exact.numbers import integers
 from ptcc_certify.checker.input_formulas import PrescribedGain
 from ptcc_certify.checker.matrix_products import Matrix
 from ptcc_certify.checker.reading import length, need
-from ptcc_certify.checker.sections import Several, Triangle
+from ptcc_certify.checker.section_declarations import Several, Triangle
 
 #: Largest order, and largest dimension of space.
 LARGEST_ORDER, LARGEST_DIMENSION = 8, 8

@@ -21,11 +21,11 @@ from ptcc_certify.checker.agent_cascade import check_cascade
 from ptcc_certify.checker.agent_decrease import check_decrease, check_phases
 from ptcc_certify.checker.agent_instants import Halved, check_instants, halvings, value_above
 from ptcc_certify.checker.agent_model import Agents, OneAgent, agents_of
-from ptcc_certify.checker.agent_motion import check_ends, need_shape, sized_offsets
+from ptcc_certify.checker.common_motion import check_ends, need_shape, sized_offsets
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.input import Verified
-from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, length, need
-from ptcc_certify.checker.sections import Ball, ByAgent, Several
+from ptcc_certify.checker.section_declarations import Ball, ByAgent, Several
 
 
 @dataclass(frozen=True, kw_only=True)

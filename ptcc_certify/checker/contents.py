@@ -22,21 +22,21 @@ from ptcc_certify.checker.family import (
     ModeStructures,
 )
 from ptcc_certify.checker.family_bounds import FamilyInput
+from ptcc_certify.checker.family_ends import Mean
 from ptcc_certify.checker.family_function import Multipliers
-from ptcc_certify.checker.family_limits import Mean
 from ptcc_certify.checker.family_rows import FamilyFunctionsSection
 from ptcc_certify.checker.family_squares import FactorWitness
 from ptcc_certify.checker.final_state import AgentsVector, FormationSection, InfluenceSection
 from ptcc_certify.checker.graph import GraphSection
 from ptcc_certify.checker.input import EnergyWitness, InputSection, PeakWitness
 from ptcc_certify.checker.late_form import LateFormWitness
+from ptcc_certify.checker.late_messages import MessagesSection, StepsStart
 from ptcc_certify.checker.leaders import LeadersSection
 from ptcc_certify.checker.lyapunov import FunctionsSection
-from ptcc_certify.checker.messages import MessagesSection, StepsStart
 from ptcc_certify.checker.missed_deadline import Signs
 from ptcc_certify.checker.protocol import NominalSection, ReachingTimes, SlidingSection
 from ptcc_certify.checker.rates import InertiaWitness, MeanWitness, OvershootSection, RatesSection
-from ptcc_certify.checker.sections import (
+from ptcc_certify.checker.section_declarations import (
     Agents,
     Ball,
     Brings,

@@ -16,10 +16,10 @@ from lmi.exact.definite import SparseFactor
 from lmi.exact.numbers import longest
 from lmi.exact.polynomials import row_sum
 from lmi.exact.work import fits, spend
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.matrix_products import Sparse, block
-from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import entries, exact, need
-from ptcc_certify.checker.sections import Integers, Several, Unread, Vector, read
+from ptcc_certify.checker.section_declarations import Integers, Several, Unread, Vector, read
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.structure import Structure
 from ptcc_certify.checker.theorem_function import group_decrease

@@ -19,11 +19,11 @@ from typing import Any, Literal, TypeAlias
 
 from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import keeps, spend
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.graph import NODE_BYTES, digraph
 from ptcc_certify.checker.graph import Edge as KnownEdge
-from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import Interval, RejectedError, entries, exact, need
-from ptcc_certify.checker.sections import (
+from ptcc_certify.checker.section_declarations import (
     Ball,
     ByNumber,
     Integers,

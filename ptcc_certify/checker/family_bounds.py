@@ -5,7 +5,7 @@ With ``V <= e^(-r s) V(0)`` and ``|(L X)_k| <= c_k sqrt(V)`` for every member, f
     |u_k| <= gain c_k sqrt(V(0)) e^(-r s / 2),      |x_k(t) - x_k(T)| <= (2/r) c_k sqrt(V(0)) e^(-r s / 2)
 
 and ``r rho2 kappa >= 2`` makes the first largest at ``t = 0``. Where agents end by the common kernel is in
-:mod:`~ptcc_certify.checker.family_limits`. Sliding variables that are not 0 at first drive the agents besides: then all
+:mod:`~ptcc_certify.checker.family_ends`. Sliding variables that are not 0 at first drive the agents besides: then all
 this is said of ``y = x - sigma``, with what :mod:`~ptcc_certify.checker.family_sliding` adds.
 """
 
@@ -19,17 +19,17 @@ from typing import Protocol
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import spend
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import STABILITY, Component, Family
+from ptcc_certify.checker.family_ends import WeightedMean, check_means, limits
 from ptcc_certify.checker.family_function import Scaled
-from ptcc_certify.checker.family_limits import WeightedMean, check_means, limits
 from ptcc_certify.checker.family_rows import Function as VerifiedFunction
 from ptcc_certify.checker.family_sliding import Drive, Sizes, nominal_gain
 from ptcc_certify.checker.input_formulas import BITS, root_above
-from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin, SlidingPart, check_sliding_part, sliding_part
 from ptcc_certify.checker.protocol import Protocol as Parameters
 from ptcc_certify.checker.reading import Interval, RejectedError, length, need
-from ptcc_certify.checker.sections import FewAgents
+from ptcc_certify.checker.section_declarations import FewAgents
 
 Gains = Mapping[str, Fraction]
 #: Products of short integers that a root costs, about.

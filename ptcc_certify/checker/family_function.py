@@ -19,8 +19,9 @@ from lmi.exact.definite import Arithmetic
 from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import Component, Edge, Family, combination
-from ptcc_certify.checker.family_limits import WeightedMean
+from ptcc_certify.checker.family_ends import WeightedMean
 from ptcc_certify.checker.graph import ordered, positions
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.checker.matrix_products import (
@@ -31,9 +32,8 @@ from ptcc_certify.checker.matrix_products import (
     times,
     transposed,
 )
-from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, need
-from ptcc_certify.checker.sections import Nodes, Several, Some, Triangle
+from ptcc_certify.checker.section_declarations import Nodes, Several, Some, Triangle
 
 Vector = dict[int, Fraction]
 #: Integers by node, and a number by which all are multiplied.

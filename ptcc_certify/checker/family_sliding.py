@@ -21,6 +21,7 @@ from lmi.exact.decimal_rounding import up
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.numbers import longest
 from lmi.exact.work import spend
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import Family
 from ptcc_certify.checker.family_rows import Function as VerifiedFunction
 from ptcc_certify.checker.input_formulas import (
@@ -31,7 +32,6 @@ from ptcc_certify.checker.input_formulas import (
     root_above,
     stretches,
 )
-from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin, check_sliding
 from ptcc_certify.checker.protocol import Protocol as Parameters
 from ptcc_certify.checker.reading import Interval, need

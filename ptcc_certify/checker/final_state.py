@@ -15,12 +15,12 @@ from lmi.exact.decimal_rounding import up
 from lmi.exact.numbers import integers, longest, shorten, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.matrix_products import Matrix, need_rows
-from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin
 from ptcc_certify.checker.reading import Interval, RejectedError, length, need, same
-from ptcc_certify.checker.sections import Agents, Ball, ByFollower, Ends, Nodes, Several
+from ptcc_certify.checker.section_declarations import Agents, Ball, ByFollower, Ends, Nodes, Several
 from ptcc_certify.checker.side_files import Numbers, beside
 from ptcc_certify.checker.structure import MANY_COMPONENTS, Claim, Structure
 

@@ -9,9 +9,9 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from lmi.exact.work import keeps
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.reading import entries, exact, fields, need
-from ptcc_certify.checker.sections import Column, Labels, Node, Pattern, Several, Sha256, Unread, read
+from ptcc_certify.checker.section_declarations import Column, Labels, Node, Pattern, Several, Sha256, Unread, read
 from ptcc_certify.checker.side_files import Numbers, beside
 
 #: From this number of edges on NumPy is used, where it is there.

@@ -14,13 +14,13 @@ from lmi.exact.routh_test import nonzero_spectrum_beyond, tractable
 from lmi.exact.work import spend
 from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.digraph import Digraph
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.final_state import FinalState
 from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.checker.matrix_products import Matrix, block, congruence, decrease, less, need_rows, only
-from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin, Protocol, SlidingPart, check_sliding_part, sliding_part
 from ptcc_certify.checker.reading import RejectedError, length, need
-from ptcc_certify.checker.sections import ByAgent, FewAgents, Positive, Rule, Several, Triangle
+from ptcc_certify.checker.section_declarations import ByAgent, FewAgents, Positive, Rule, Several, Triangle
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.structure import Structure
 

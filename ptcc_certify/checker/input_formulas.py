@@ -21,8 +21,8 @@ from lmi.exact.definite import Arithmetic
 from lmi.exact.elementary_enclosures import LARGEST_EXPONENT, exp, log, rounded, sqrt
 from lmi.exact.numbers import integers, longest
 from lmi.exact.work import spend
+from ptcc_certify.checker.lyapunov_form import Form
 from ptcc_certify.checker.matrix_products import congruence
-from ptcc_certify.checker.quadratic_form import Form
 from ptcc_certify.checker.reading import Interval, length
 
 #: Bits to which bounds are rounded.

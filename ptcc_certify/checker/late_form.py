@@ -15,13 +15,13 @@ from lmi.exact.numbers import integers, longest, shorten
 from lmi.exact.work import spend
 from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.digraph import Digraph
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.input import Verified, proved_above
 from ptcc_certify.checker.late_input import Inputs
-from ptcc_certify.checker.late_messages import Messages
-from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.quadratic_form import Form
+from ptcc_certify.checker.lyapunov_form import Form
+from ptcc_certify.checker.messages_asked import Messages
 from ptcc_certify.checker.reading import RejectedError, length, need
-from ptcc_certify.checker.sections import FewAgents
+from ptcc_certify.checker.section_declarations import FewAgents
 from ptcc_certify.checker.side_files import Numbers
 
 #: Largest ``b gain_cap delay``; what is larger asks for a ``q`` that nothing allows.

@@ -8,10 +8,10 @@ from operator import mul
 
 from lmi.exact.decimal_rounding import up
 from lmi.exact.numbers import integers
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.input_formulas import PrescribedGain, decay_above
-from ptcc_certify.checker.late_messages import Messages
 from ptcc_certify.checker.late_steps import clock_below
-from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.messages_asked import Messages
 from ptcc_certify.checker.reading import RejectedError, need
 from ptcc_certify.checker.rows import Rows
 from ptcc_certify.checker.side_files import Numbers

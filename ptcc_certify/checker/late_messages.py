@@ -1,167 +1,243 @@
-"""Reads how late messages are: ages of what is heard, packets that get lost, values that are rounded."""
+"""Verifies what holds where messages are late, get lost or are rounded: section 22 of the format."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
-from math import ceil
-from typing import Literal
+from itertools import pairwise
 
-from lmi.exact.elementary_enclosures import log
-from lmi.exact.numbers import longest
+from lmi.exact.decimal_rounding import down, up
 from lmi.exact.work import spend
-from ptcc_certify.checker.input_formulas import Limits, PrescribedGain, decay_above
+from ptcc_certify.checker import input_formulas as formulas
+from ptcc_certify.checker.delay_lmi import LateLMI, check_delay_lmi
+from ptcc_certify.checker.digraph import Digraph
+from ptcc_certify.checker.document import Document
+from ptcc_certify.checker.drift_by_leaders import drift_above
+from ptcc_certify.checker.family import Family
+from ptcc_certify.checker.graph import MANY_EDGES
+from ptcc_certify.checker.input import Verified
+from ptcc_certify.checker.late_form import LateForm, check_form
+from ptcc_certify.checker.late_input import Inputs
+from ptcc_certify.checker.late_steps import FIXED, Steps, clock_below
+from ptcc_certify.checker.messages_asked import Delays, Messages, Moving, need_left, read_messages
+from ptcc_certify.checker.missed_deadline import MissedDeadline, check_missed, check_staged
+from ptcc_certify.checker.protocol import Begin, Protocol
 from ptcc_certify.checker.reading import length, need
-from ptcc_certify.checker.sections import EdgeNumbers, NotNegative, Positive
+from ptcc_certify.checker.rows import Followers, Rows, followers_of
+from ptcc_certify.checker.section_declarations import Agents, ByFollower, FollowerNumbers, Positive, Several
+from ptcc_certify.checker.settling_leaders import SettlingSection, check_settling
 from ptcc_certify.checker.side_files import Numbers
+from ptcc_certify.checker.stated_bounds import Decay, Stated
+from ptcc_certify.checker.virtual_positions import Vehicles, VehiclesSection
 
-#: Ages of what is heard over single edges are rounded up to so many parts of the largest one.
-PARTS = 64
+#: Witnesses of rows, and instants of steps, that are read.
+MANY_ROWS, MANY_INSTANTS = 100, 2001
+#: What is not proved where leaders move, and what of families.
+AT_REST = ("missed", "staged", "settling", "form", "lmi")
+OF_ONE_GRAPH = ("steps", *AT_REST)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Moving:
-    """Leaders that move.
+class RowsBound:
+    """A bound by rows; ``drift`` and ``after`` where leaders move."""
 
-    Attributes
+    cap: Positive | None
+    clock: Fraction | None
+    left: Fraction
+    initial: Fraction
+    floor: Fraction
+    drift: Fraction | None = None
+    after: Fraction | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepsBound:
+    """A bound from instant to instant."""
+
+    instants: Several[Fraction]
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepsStart:
+    """The witness of a bound from instant to instant."""
+
+    start: FollowerNumbers
+
+
+@dataclass(frozen=True, kw_only=True)
+class MessagesSection(Delays):
+    """What the file says of late messages."""
+
+    rows: Several[RowsBound]
+    steps: StepsBound | None
+    residual: Agents | None
+    missed: MissedDeadline | None
+    staged: ByFollower[Fraction] | None
+    settling: SettlingSection | None
+    form: LateForm | None
+    lmi: LateLMI | None
+    input: Agents | None
+    vehicles: VehiclesSection | None = None
+
+
+class Residual:
+    """What is stated of ``|x_k(T) - x*_k|`` of followers; leaders rest.
+
+    Parameters
     ----------
-    speed, disturbance : Fraction
-        Of every leader, and of every follower, at most.
+    doc : Document
+    values : Numbers
+        By agent.
     """
 
-    speed: NotNegative
-    disturbance: NotNegative
+    def __init__(self, doc: Document, followers: Followers, values: Numbers):
+        doc.at = "messages.residual"
+        self.stated = Stated("residual", followers.labels, values)
+        self.stated.rest(followers.others, "a residual of a leader that rests")
 
-    @property
-    def push(self) -> Fraction:
-        """How fast a follower and its target may part."""
-        return self.speed + self.disturbance
+    def by_rows(self, rows: Rows, decay: Decay) -> None:
+        """Mark what is at least as large as this decay leaves it."""
+        at_T = decay.initial * decay.left + decay.floor + decay.drift
+        self.stated.meet(rows.followers.nodes, (at_T / rows.scale, rows.u))
 
-
-@dataclass(frozen=True, eq=False)
-class Messages:
-    """What is heard, and when.
-
-    Attributes
-    ----------
-    gain : PrescribedGain
-        That of the protocol.
-    latency : Numbers
-        The least age of what is heard over each edge; one number for all.
-    delay : Fraction
-        Nothing that is heard is older; over an edge nothing is older than its latency and what values are held.
-    late : bool
-        The own state is as old as what is heard.
-    value_error : Fraction
-        No value is off by more.
-    gain_cap : Fraction or None
-        What the gain is capped at.
-    leaders : Moving or None
-        How fast leaders move, and what disturbs the followers; None if they rest, and nothing does.
-    """
-
-    gain: PrescribedGain
-    latency: Numbers
-    delay: Fraction
-    late: bool
-    value_error: Fraction
-    gain_cap: Fraction | None
-    leaders: Moving | None = None
-
-    def least_gain(self, always: bool = False) -> Fraction:
-        """Return the least gain up to ``T``, or of all times: ``rho1``, or the first one, or its cap."""
-        least = self.gain.rho1 if always else self.gain.value(Fraction(1))
-        return least if self.gain_cap is None else min(least, self.gain_cap)
-
-    @property
-    def wrong(self) -> Fraction:
-        """What is heard differs from what is so by no more, deviations left out: targets move on while it is late."""
-        return self.value_error + (self.leaders.speed * self.delay if self.leaders else 0)
-
-    def latency_of(self, edge: int) -> Fraction:
-        """Return the latency of an edge, by its place among all."""
-        return self.latency[edge if len(self.latency) > 1 else 0]
-
-    @cached_property
-    def parts(self) -> Sequence[int]:
-        """Return the age of what is heard over each edge, at most, in 64ths of the largest one; one for all edges.
-
-        Raises
-        ------
-        WorkError
-            Latencies are too long to be compared.
-        """
-        if len(self.latency) == 1 or not self.delay:
-            return (PARTS,)
-        distinct, held = set(self.latency.values), self.delay - self.latency.largest()
-        bits = longest((*self.delay.as_integer_ratio(), *held.as_integer_ratio(), self.latency.scale or 1))
-        spend(4 * len(distinct), bits, bits + length(map(Fraction, distinct)), "ages of what is heard")
-        part = {x: ceil(PARTS * (Fraction(x) / (self.latency.scale or 1) + held) / self.delay) for x in distinct}
-        each = [part[x] for x in self.latency.values]
-        return each if min(each) < PARTS else (PARTS,)
+    def close(self, doc: Document) -> None:
+        """Verify that a bound meets what is stated of every follower."""
+        doc.open("late-residual", "messages.residual")
+        self.stated.close()
+        doc.done(f"at most {up(self.stated.largest)}")
 
 
-def need_left(
-    messages: Messages, q: Fraction, b: Fraction, cap: Fraction | None, clock: Fraction | None, left: Fraction
-) -> Fraction | None:
-    """Verify that ``q`` serves the delay under a cap, how far the clock comes then, and what is left at ``T``.
+def check_messages(doc: Document, of: Verified | Family, protocol: Protocol, begin: Begin) -> None:
+    """Verify everything that is said of late messages, if there is something."""
+    if "messages" not in doc.data:
+        return
+    if isinstance(of, Family):
+        doc.context.edges = len(of.pairs)
+    section = doc.section("messages")
+    need("leaders" not in doc.data, "leaders that move beside late messages stand under messages")
+    need(begin.sigma is None or not any(begin.sigma.values), "late messages while sliding variables move")
+    messages = read_messages(protocol.gain, section)
+    if messages.leaders is not None:
+        need(not protocol.sliding, "leaders that move under the sliding-mode protocol")
+        need(all(getattr(section, key) is None for key in AT_REST), f"one of {', '.join(AT_REST)} though leaders move")
+    need(len(section.rows) <= MANY_ROWS, f"more than {MANY_ROWS} witnesses of rows")
+    bounded = bool(section.rows) or section.steps is not None
+    by_rows = bounded or section.missed is not None or section.staged is not None
+    whole = any(x is not None for x in (section.settling, section.form, section.lmi))
+    need(by_rows or whole, "nothing is stated of late messages")
+    need(bounded == (section.residual is not None), "a residual is stated iff rows or steps bound it")
+    inputs = None if section.input is None else Inputs(doc, messages, section.input)
+    vehicles = None
+    if section.vehicles is not None:
+        need(not protocol.sliding and bool(section.rows), "vehicles without rows, or under the sliding-mode protocol")
+        vehicles = Vehicles(doc, messages, section.vehicles)
+    if isinstance(of, Family):
+        need(
+            all(getattr(section, key) is None for key in OF_ONE_GRAPH), f"one of {', '.join(OF_ONE_GRAPH)} of a family"
+        )
+    if by_rows:
+        need(not messages.late, "rows, steps, missed or staged of a late own state")
+        followers = followers_of(doc, of if isinstance(of, Family) else of.structure, begin)
+        residual = None if section.residual is None else Residual(doc, followers, section.residual)
+        stated = [one for one in (residual, inputs, vehicles) if one is not None]
+        for k, entry in enumerate(section.rows):
+            _check_rows(doc, messages, followers, entry, f"messages.rows[{k}]", stated)
+        if isinstance(of, Verified) and section.steps is not None and residual is not None:
+            _check_steps(doc, messages, followers, of.structure.graph, section.steps.instants, residual.stated)
+        if residual is not None:
+            residual.close(doc)
+        if isinstance(of, Verified) and section.missed is not None:
+            check_missed(doc, messages, of.structure, begin, section.missed)
+        if isinstance(of, Verified) and section.staged is not None:
+            check_staged(doc, messages, of.structure, section.staged)
+    if isinstance(of, Verified):
+        if section.settling is not None:
+            check_settling(doc, messages, of, section.settling, inputs)
+        if section.form is not None:
+            check_form(doc, messages, of, section.form, inputs)
+        if section.lmi is not None:
+            check_delay_lmi(doc, messages, of, section.lmi, inputs)
+    for one in (inputs, vehicles):
+        if one is not None:
+            one.close(doc)
 
-    Return what caps the clock.
-    """
-    need(cap is None or b * cap * messages.delay <= log(q)[0], "b cap delay is above ln q")
-    limit = min((x for x in (cap, messages.gain_cap) if x is not None), default=None)
-    need((limit is None) == (clock is None), "clock is null iff nothing caps the gain")
-    if limit is None or clock is None:
-        need(left == 0, "left is not 0 though the clock goes on for ever")
-    else:
-        need(0 <= clock <= Limits(limit).clock_below(messages.gain), "the clock does not come so far")
-        need(left >= decay_above(b * clock), "left is not proved")
-    return limit
+
+def _check_rows(
+    doc: Document,
+    messages: Messages,
+    followers: Followers,
+    entry: RowsBound,
+    of: str,
+    stated: Sequence[Residual | Inputs | Vehicles],
+) -> None:
+    """Verify ``|x_k - x*_k| <= u_k (initial e^(-b s) + floor)`` by one witness of rows."""
+    doc.at = of
+    cap, clock, left, initial, floor = entry.cap, entry.clock, entry.left, entry.initial, entry.floor
+    for x in (entry.drift, entry.after):
+        need((x is None) == (messages.leaders is None), "drift and after are told iff leaders move")
+    obligation = doc.open("late-rows", of)
+    q, b = obligation["q"], obligation["b"]
+    need(q > 1 or (q == 1 and messages.delay == 0), "q is not above 1")
+    need((cap is None) == (messages.delay == 0), "cap is null iff nothing is late")
+    bits = length((q, b, left, clock or left, cap or left, messages.delay, messages.gain.T, messages.gain.rho1))
+    spend(50, bits, bits, "rows of followers")
+    rows = Rows(followers, obligation["witness"].u)
+    rows.decay(q, b, messages.parts)
+    limit = need_left(messages, q, b, cap, clock, left)
+    rows.above_initial(initial)
+    rows.above_floor(floor, messages.wrong)
+    drift, floor_up_to_T = Fraction(0), floor
+    if messages.leaders is not None:
+        drift, after = _drift(messages, messages.leaders, rows, b, limit, entry)
+        floor_up_to_T += after * messages.least_gain(always=True) / messages.least_gain()
+    for one in stated:
+        one.by_rows(rows, Decay(b, cap, left, initial, floor, drift, floor_up_to_T))
+    doc.done(f"b = {down(b)}, q = {down(q)}")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Packets:
-    """Values that are sent every so often, and held until the next one arrives."""
-
-    period: Positive
-    losses: NotNegative
-
-
-@dataclass(frozen=True, kw_only=True)
-class Delays:
-    """What the file says of how late messages are; ``latency``: one number for all edges, or one for each."""
-
-    latency: Fraction | EdgeNumbers
-    packets: Packets | None
-    delay: Fraction
-    own: Literal["fresh", "late"]
-    value_error: NotNegative
-    gain_cap: Positive | None
-    leaders: Moving | None
+def _drift(
+    messages: Messages, leaders: Moving, rows: Rows, b: Fraction, limit: Fraction | None, entry: RowsBound
+) -> tuple[Fraction, Fraction]:
+    """Verify what leaders that move, and disturbances, add at ``T``, and at all times."""
+    drift, after, gain = entry.drift or Fraction(0), entry.after or Fraction(0), messages.gain
+    bits = length((leaders.push, rows.least, drift, after, b, limit or b, gain.T, gain.rho1, gain.k))
+    spend(100, bits, bits, "drift of followers")
+    need(drift >= leaders.push / rows.least * drift_above(gain, b, limit), "drift is not proved")
+    rows.above_push(after, leaders.push / messages.least_gain(always=True))
+    return drift, after
 
 
-def read_messages(gain: PrescribedGain, section: Delays) -> Messages:
-    """Read the ages of what is heard, how far it is off, and what caps the gain.
-
-    Raises
-    ------
-    RejectedError
-        Some of it does not fit the rest.
-    """
-    latency, packets, delay = section.latency, section.packets, section.delay
-    if isinstance(latency, Fraction):
-        latency = Numbers([latency])
-    need(len(latency) > 0, "latencies without edges")
-    need(all(x >= 0 for x in latency.values), "a latency is negative")
-    age = latency.largest()
-    if packets is not None:
-        need(packets.losses.denominator == 1, "losses is no number of packets")
-        age += (packets.losses + 1) * packets.period
-    need(delay == age, "delay is not the largest age of what is heard")
-    virtual = getattr(section, "vehicles", None) is not None
-    need(virtual or delay > 0 or section.value_error > 0, "nothing is late, and nothing is off")
-    late, cap = section.own == "late", section.gain_cap
-    need(cap is not None or not late, "the own state is late, and the gain has no cap: the protocol diverges")
-    return Messages(gain, latency, delay, late, section.value_error, cap, section.leaders)
+def _check_steps(
+    doc: Document,
+    messages: Messages,
+    followers: Followers,
+    graph: Digraph,
+    instants: Sequence[Fraction],
+    residual: Stated,
+) -> None:
+    """Verify the start of a solution that never grows, and form its bounds at the deadline."""
+    doc.at = "messages.steps"
+    gain = messages.gain
+    need(2 <= len(instants) <= MANY_INSTANTS, f"instants are fewer than 2 or more than {MANY_INSTANTS}")
+    need(all(a < b for a, b in pairwise(instants)), "instants do not ascend")
+    need(instants[0] == 0 and instants[-1] == gain.T, "instants do not reach from 0 to the deadline")
+    need(messages.delay > 0, "steps though nothing is late")
+    start = doc.open("late-steps", "messages.steps")["witness"].start
+    need(all(x >= 0 for x in start.values), "start is negative")
+    values, scale = start.over(range(len(start)))
+    error, limits = messages.wrong * scale, formulas.Limits(messages.gain_cap)
+    bits = length((gain.T, gain.rho1, gain.k, messages.delay, messages.gain_cap or gain.T, *instants))
+    spend(60 * len(instants), bits, bits, "instants of steps")
+    gains = [limits.gain_at(gain, t) for t in instants[:-1]] if messages.leaders is not None else []
+    push = messages.leaders.push * scale / gains[0] if messages.leaders is not None else Fraction(0)
+    followers.starts_within(values, scale)
+    followers.never_grows(values, error, push)
+    ways = [clock_below(gain, messages.gain_cap, a, b) for a, b in pairwise(instants)]
+    kind, degrees = Steps, [graph.diagonal[v] for v in followers.nodes]
+    if doc.exact.numpy and graph.n_edges >= MANY_EDGES:
+        from ptcc_certify.checker.late_steps_arrays import ArraySteps as kind  # noqa: N813
+    steps = kind(graph, followers.nodes, degrees, values, error, messages.parts, push)
+    bounds = steps.run(instants, messages.delay, ways, gains)
+    residual.meet(followers.nodes, (Fraction(steps.largest, scale << FIXED), bounds))
+    doc.done(f"{len(ways)} steps")

@@ -21,7 +21,7 @@ from lmi.exact.numbers import longest, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.input_formulas import BITS, PrescribedGain
-from ptcc_certify.checker.late_messages import PARTS
+from ptcc_certify.checker.messages_asked import PARTS
 
 #: Bits of a fixed-point number, of the share of a degree in the largest one, and of the way of the clock.
 FIXED, SHARE, WAY = 30, 40, 42

@@ -7,12 +7,12 @@ from fractions import Fraction
 
 from lmi.exact.decimal_rounding import down
 from lmi.exact.work import spend
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import Family
-from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin, Protocol
 from ptcc_certify.checker.reading import length, need
 from ptcc_certify.checker.rows import Rows, followers_of
-from ptcc_certify.checker.sections import Agents, NotNegative
+from ptcc_certify.checker.section_declarations import Agents, NotNegative
 from ptcc_certify.checker.stated_bounds import Stated
 from ptcc_certify.checker.structure import Structure
 

@@ -10,14 +10,14 @@ from typing import Literal
 from lmi.exact.decimal_rounding import down, up
 from lmi.exact.numbers import integers, longest, shorten, sized
 from lmi.exact.work import spend
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.dominance import Proved, check_dominance
 from ptcc_certify.checker.final_state import FinalState
 from ptcc_certify.checker.graph import positions
+from ptcc_certify.checker.lyapunov_form import Form
 from ptcc_certify.checker.matrix_products import Matrix, block, combined, decays, less, need_rows, only
-from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.quadratic_form import Form
 from ptcc_certify.checker.reading import RejectedError, need
-from ptcc_certify.checker.sections import FewAgents, Several
+from ptcc_certify.checker.section_declarations import FewAgents, Several
 from ptcc_certify.checker.side_files import Numbers, beside
 from ptcc_certify.checker.structure import Structure
 from ptcc_certify.checker.theorem_function import BlockSection, Paper

@@ -11,12 +11,12 @@ from lmi.exact.elementary_enclosures import exp, log
 from lmi.exact.numbers import shorten
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph, edges_of
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.input_formulas import BITS
-from ptcc_certify.checker.late_messages import Messages
-from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.messages_asked import Messages
 from ptcc_certify.checker.protocol import Begin
 from ptcc_certify.checker.reading import length, need
-from ptcc_certify.checker.sections import FollowerIntegers, Node, Positive
+from ptcc_certify.checker.section_declarations import FollowerIntegers, Node, Positive
 from ptcc_certify.checker.structure import Structure
 
 #: Products of short integers that an exponential and a logarithm cost, about.

@@ -12,10 +12,10 @@ from lmi.exact.elementary_enclosures import decay_integrals_below
 from lmi.exact.numbers import shorten
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.input_formulas import PrescribedGain
-from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, need
-from ptcc_certify.checker.sections import ByAgent, FewAgents, NotNegative, Positive
+from ptcc_certify.checker.section_declarations import ByAgent, FewAgents, NotNegative, Positive
 from ptcc_certify.checker.side_files import Numbers
 
 SLIDING_BOUND = "||sigma(t)|| <= phi(t,T_r)^(-mu3) e^(-mu2 t) ||sigma(0)||"

@@ -8,12 +8,12 @@ from fractions import Fraction
 
 from lmi.exact.decimal_rounding import up
 from lmi.exact.numbers import integers
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.checker.matrix_products import block, congruence, decays, need_rows
-from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import need
-from ptcc_certify.checker.sections import Node, Nodes, Several, Triangle
+from ptcc_certify.checker.section_declarations import Node, Nodes, Several, Triangle
 from ptcc_certify.checker.structure import Structure
 from ptcc_certify.checker.theorem_function import Paper
 

@@ -22,10 +22,10 @@ from lmi.exact.elementary_enclosures import exp, log, rounded
 from lmi.exact.numbers import common_denominator, integers, longest, shorten, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import Edge, Family
 from ptcc_certify.checker.input_formulas import BITS
-from ptcc_certify.checker.late_messages import PARTS
-from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.messages_asked import PARTS
 from ptcc_certify.checker.protocol import Begin
 from ptcc_certify.checker.reading import need
 from ptcc_certify.checker.side_files import Numbers

@@ -10,10 +10,20 @@ from itertools import pairwise
 from typing import Annotated, Any, Literal, TypeAlias
 
 from ptcc_certify.checker.digraph import Digraph
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.graph import positions
-from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, entries, fields, need, same
-from ptcc_certify.checker.sections import Ball, Integers, ManyNodes, Node, Nodes, Pattern, Several, Some, Unread
+from ptcc_certify.checker.section_declarations import (
+    Ball,
+    Integers,
+    ManyNodes,
+    Node,
+    Nodes,
+    Pattern,
+    Several,
+    Some,
+    Unread,
+)
 from ptcc_certify.checker.side_files import beside
 
 #: Above this many weak components they are listed in arrays.

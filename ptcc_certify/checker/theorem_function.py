@@ -9,12 +9,12 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 from lmi.exact.decimal_rounding import down
 from lmi.exact.numbers import integers
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.graph import positions
+from ptcc_certify.checker.lyapunov_form import Form
 from ptcc_certify.checker.matrix_products import block, congruence, decays, decrease, diagonal, less, need_rows
-from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.quadratic_form import Form
 from ptcc_certify.checker.reading import entries, exact, need
-from ptcc_certify.checker.sections import ManyNodes, Positive, Several, Triangle, Vector
+from ptcc_certify.checker.section_declarations import ManyNodes, Positive, Several, Triangle, Vector
 from ptcc_certify.checker.structure import Claim, Structure, Theorem
 
 #: By how much weights may be off the left null vector of the comparison matrix: this part of each diagonal term.

@@ -12,12 +12,12 @@ from operator import mul
 
 from lmi.exact.decimal_rounding import down, up
 from lmi.exact.work import spend
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.late_input import gain_above
-from ptcc_certify.checker.late_messages import Messages
-from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.messages_asked import Messages
 from ptcc_certify.checker.reading import length, need
 from ptcc_certify.checker.rows import Rows
-from ptcc_certify.checker.sections import Agents, Positive
+from ptcc_certify.checker.section_declarations import Agents, Positive
 from ptcc_certify.checker.stated_bounds import Decay, Stated
 
 #: Coefficients of ``|v_k(0)|``, of ``u_k``, of ``D_k u_k + sum_l |w_kl| u_l``, of ``D_k u_k`` and of ``D_k``.

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from lmi.exact.decimal_rounding import counted
-from ptcc_certify.cli.declared import (
+from ptcc_certify.cli.click_options import (
     A0,
     DIMENSION,
     click_option,
@@ -243,7 +243,7 @@ def run_of_agents(case: Case, samples: int, **pattern: Any) -> AgentsTrajectory:
 
 def read_vectors(text: str, seed: Any, graph: SignedDigraph, dimension: int, name: str) -> Any:
     """Return N rows of ``dimension`` exact numbers: agent after agent, of a file ``node,x,y``, or random."""
-    from ptcc_certify.graphs.io.initial_state import random_states, read_vectors_of_file
+    from ptcc_certify.graphs.io.states import random_states, read_vectors_of_file
 
     if text == "random":
         return random_states(seed, graph.n_nodes, dimension)

@@ -12,10 +12,10 @@ from typing import Any
 import click
 
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.declared import Command, one_of
+from ptcc_certify.cli.click_options import Command, one_of
 from ptcc_certify.cli.terminal import counting, print_lines
 from ptcc_certify.errors import ExitCode, ParameterError
-from ptcc_certify.graphs.kinds_of_file import kind_of
+from ptcc_certify.graphs.recognised_files import kind_of
 from ptcc_certify.model.asks import Asks, Expectations
 
 
@@ -157,7 +157,7 @@ def _tell_rows(rows: list[dict[str, Any]], total: int, output: str | None, resta
 
 def _exit_code(rows: Sequence[dict[str, Any]]) -> int:
     """Return the exit code of the worst row, and tell how many rows are not what one would wish."""
-    from ptcc_certify.certificate.exit_code import OPEN, REFUTED, exit_code
+    from ptcc_certify.certificate.assessment import OPEN, REFUTED, exit_code
 
     failed = [row for row in rows if row["error"] is not None]
     violated = sum(row["bound_kept"] is False for row in rows)

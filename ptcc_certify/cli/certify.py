@@ -17,7 +17,7 @@ from ptcc_certify.cli.agents import (
     refuse_agents_of_family,
     refuse_dimension,
 )
-from ptcc_certify.cli.declared import Command, one_of
+from ptcc_certify.cli.click_options import Command, one_of
 from ptcc_certify.cli.families import (
     certify_family,
     family_options,
@@ -25,7 +25,13 @@ from ptcc_certify.cli.families import (
     refuse_restricted,
     restricted_options,
 )
-from ptcc_certify.cli.messages import leader_options, leaders_of, message_options, messages_of, refuse_unheard
+from ptcc_certify.cli.messages_and_leaders import (
+    leader_options,
+    leaders_of,
+    message_options,
+    messages_of,
+    refuse_unheard,
+)
 from ptcc_certify.cli.scenario import scenario_record
 from ptcc_certify.cli.terminal import LOG, Screen, in_flags, print_json, progress, refuse_output, screen_options
 from ptcc_certify.errors import one_line
@@ -95,8 +101,8 @@ def _certify_graph(
     options: shared.Options,
 ) -> int:
     """Certify what the protocol does on one graph."""
+    from ptcc_certify.certificate.assessment import rejects
     from ptcc_certify.certificate.certification import certify_case
-    from ptcc_certify.certificate.exit_code import rejects
     from ptcc_certify.certificate.graph_certification import STEPS
     from ptcc_certify.report.facts.of_certificate import facts_of
 

@@ -52,7 +52,7 @@ def check(
     `python -m ptcc_certify.checker` does the same, without other packages.
     """
     from ptcc_certify.certificate.checking import read_and_check
-    from ptcc_certify.cli.verified import verified_check
+    from ptcc_certify.cli.proved_checker import verified_check
     from ptcc_certify.report.screen import check_summary
     from ptcc_certify.report.text_layout import wrap_lines
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from ptcc_certify.cli.declared import Command
+from ptcc_certify.cli.click_options import Command
 from ptcc_certify.cli.families import classify_family, family_options, read_graph_or_family
 from ptcc_certify.cli.options import expect_option, graphs_argument, json_option, reading_options
 from ptcc_certify.cli.terminal import Screen, print_json, print_lines, screen_options
@@ -42,7 +42,7 @@ def classify(graph: tuple[str, ...], expect: str | None, as_json: bool, screen: 
         screen.show(lambda details: structure_facts(structure, graph[0]))
     if expect is None:
         return ExitCode.OK
-    from ptcc_certify.certificate.exit_code import MET
+    from ptcc_certify.certificate.assessment import MET
     from ptcc_certify.certificate.judgements import judge_behaviour
 
     answer = judge_behaviour(structure, expect)

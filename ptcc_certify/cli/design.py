@@ -10,7 +10,7 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli.agents import agents_of, agents_options, dimension_option
-from ptcc_certify.cli.declared import SHORTEST, click_option, one_of
+from ptcc_certify.cli.click_options import SHORTEST, click_option, one_of
 from ptcc_certify.cli.design_of_agents import command_of_agents, design_of_agents, refuse_of_agents, template_options
 from ptcc_certify.cli.options import (
     OneGraph,

@@ -9,7 +9,7 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli.agents import agents_and_states
-from ptcc_certify.cli.declared import flag_of, one_of, together
+from ptcc_certify.cli.click_options import flag_of, one_of, together
 from ptcc_certify.cli.options import Options, kind_option, protocol_of
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import short_exact
@@ -61,7 +61,7 @@ def refuse_of_agents() -> None:
 
 def design_of_agents(signed: SignedDigraph, options: Options) -> AgentsDesign:
     """Return the deadline of the agents that the options tell."""
-    from ptcc_certify.gain_design.agents_search import design_agents
+    from ptcc_certify.gain_design.agents_shortest_deadline import design_agents
 
     if options["input_norm"]:
         raise ParameterError("--input-norm: is of single integrators; of agents in space U bounds ||u_k|| as it is")

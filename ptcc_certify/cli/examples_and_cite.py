@@ -36,7 +36,7 @@ def examples(name: str, output: str | None, suffix: str) -> int:
     steps = [f"example {example.number} on {graph}" for example, graph, _ in selection]
     with progress([*steps, "figures"] if output else steps) as begin:
         begin(steps[0])
-        from ptcc_certify.certificate.exit_code import worst_code
+        from ptcc_certify.certificate.assessment import worst_code
         from ptcc_certify.report.example_results import RESULTS_HEAD, certify_example, result_lines
 
         print_lines(*RESULTS_HEAD)

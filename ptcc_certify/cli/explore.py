@@ -14,7 +14,7 @@ import click
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.scenario import is_scenario
 from ptcc_certify.errors import ExitCode, ParameterError
-from ptcc_certify.graphs.kinds_of_file import refuse_as_graph
+from ptcc_certify.graphs.recognised_files import refuse_as_graph
 
 
 @click.command(cls=shared.OneGraph)

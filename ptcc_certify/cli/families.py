@@ -14,12 +14,18 @@ from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.agents import agents_and_states, exchanges_virtual
-from ptcc_certify.cli.declared import SIGNAL, click_option, flag_of, options_asking, options_for, together
-from ptcc_certify.cli.messages import asks_for_leaders, asks_for_messages, leaders_of, messages_of, noted_delays
+from ptcc_certify.cli.click_options import SIGNAL, click_option, flag_of, options_asking, options_for, together
+from ptcc_certify.cli.messages_and_leaders import (
+    asks_for_leaders,
+    asks_for_messages,
+    leaders_of,
+    messages_of,
+    noted_delays,
+)
 from ptcc_certify.cli.scenario import scenario_record
 from ptcc_certify.cli.terminal import LOG, Screen, in_flags, print_json, progress
 from ptcc_certify.errors import ExitCode, ParameterError, one_line
-from ptcc_certify.graphs.option import options_of
+from ptcc_certify.graphs.declared_option import options_of
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import OPTIONAL, UNCERTAINTY
 from ptcc_certify.model.asks import Asks
@@ -214,7 +220,7 @@ def _show_decision(
     screen: Screen,
     options: shared.Options,
 ) -> None:
-    from ptcc_certify.certificate.decision_document import decision_document
+    from ptcc_certify.certificate.classification_document import decision_document
     from ptcc_certify.report.facts.of_structure import decision_facts
 
     if as_json:
@@ -226,7 +232,7 @@ def _show_decision(
 
 def _expected(components: Sequence[FamilyComponent], expect: str | None) -> int:
     """Tell on standard error what became of an expectation, and what is left undecided; return the exit code."""
-    from ptcc_certify.certificate.exit_code import MET, REFUTED
+    from ptcc_certify.certificate.assessment import MET, REFUTED
     from ptcc_certify.certificate.judgements import judge_family_behaviour
     from ptcc_certify.certificate.verdict import NEXT_STEP
 
@@ -247,9 +253,9 @@ def certify_family(
     graphs: tuple[str, ...], family: Family, output: str | None, as_json: bool, screen: Screen, options: shared.Options
 ) -> int:
     """Certify what the protocol does on a family, whatever the signal."""
+    from ptcc_certify.certificate.assessment import CERTIFIED
     from ptcc_certify.certificate.certification import certify_case
     from ptcc_certify.certificate.constrained_switching.search import require_nominal
-    from ptcc_certify.certificate.exit_code import CERTIFIED
     from ptcc_certify.certificate.family_certification import STEPS
     from ptcc_certify.report.facts.of_certificate import facts_of
     from ptcc_certify.theorems.family_behaviour import decide
@@ -302,7 +308,7 @@ def certify_family(
 
 def _judged_alone(components: Sequence[FamilyComponent], expect: str | None, output: str | None) -> int:
     """Tell what became of an expectation of fixed weights, of which no certificate is made; return the exit code."""
-    from ptcc_certify.certificate.exit_code import MET
+    from ptcc_certify.certificate.assessment import MET
     from ptcc_certify.certificate.judgements import judge_family_behaviour
 
     code = _expected(components, expect)

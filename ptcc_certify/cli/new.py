@@ -14,8 +14,8 @@ from ptcc_certify.cli.options import graph_file
 from ptcc_certify.cli.scenario import SECTIONS, is_scenario
 from ptcc_certify.cli.terminal import print_lines
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.graphs.kinds_of_file import kind_of, shell_word
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.recognised_files import kind_of, shell_word
 
 #: Columns of the file, where values leave room, and what is written in it as it is; the rest are comments.
 _WIDTH = 100

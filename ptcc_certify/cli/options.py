@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from lmi.exact.decimal_rounding import counted
-from ptcc_certify.cli.declared import (
+from ptcc_certify.cli.click_options import (
     IN_LIBRARY,
     KIND,
     OF_PROTOCOL,
@@ -37,9 +37,9 @@ from ptcc_certify.cli.scenario import (
     takes_one_graph,
 )
 from ptcc_certify.errors import Change, ParameterError
-from ptcc_certify.graphs.kinds_of_file import TOML, kind_of, refuse_as_certificate, refuse_as_graph, shell_word
-from ptcc_certify.graphs.option import options_of
+from ptcc_certify.graphs.declared_option import options_of
 from ptcc_certify.graphs.reading import Reading, option_flags
+from ptcc_certify.graphs.recognised_files import TOML, kind_of, refuse_as_certificate, refuse_as_graph, shell_word
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.asks import Asks, Expectations
 from ptcc_certify.model.gain_limits import GainLimits

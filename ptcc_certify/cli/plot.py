@@ -20,12 +20,12 @@ from ptcc_certify.cli.agents import (
     refuse_dimension,
     run_in_places,
 )
-from ptcc_certify.cli.declared import Command
+from ptcc_certify.cli.click_options import Command
 from ptcc_certify.cli.families import mode_options, read_graph_or_family, refuse_options
 from ptcc_certify.cli.scenario import MEMORY, graph_of, refuse_beside
 from ptcc_certify.cli.terminal import FIGURES, print_lines, progress, refuse_output
 from ptcc_certify.errors import ExitCode, ParameterError
-from ptcc_certify.graphs.kinds_of_file import kind_of
+from ptcc_certify.graphs.recognised_files import kind_of
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.case import Case
 from ptcc_certify.model.initial_state import InitialState
@@ -274,7 +274,7 @@ def _of_agents(signed: SignedDigraph, protocol: Protocol, what: str, options: sh
 
 def _draw(what: str, subject: Any, wide: bool, time_unit: str) -> Any:
     """Draw a figure of a certificate, a run, a family, or a graph with its protocol."""
-    from ptcc_certify.report.figures import plot as plot_of
+    from ptcc_certify.report.page_figures import plot as plot_of
     from ptcc_certify.report.plots.subject import is_of_family
     from ptcc_certify.report.plots.trajectory import plot_run
     from ptcc_certify.simulation.trajectory import Trajectory

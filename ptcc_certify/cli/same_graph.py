@@ -16,7 +16,7 @@ from click.core import ParameterSource
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.families import family_keywords, files_of, graph_or_family
 from ptcc_certify.errors import PTCCError
-from ptcc_certify.graphs.kinds_of_file import shell_word
+from ptcc_certify.graphs.recognised_files import shell_word
 
 if TYPE_CHECKING:
     from ptcc_certify.checker import CheckReport
@@ -89,7 +89,7 @@ class _Pair:
 
     def _graph(self, options: shared.Options) -> Compared:
         from ptcc_certify.certificate.graph_sections import certificate_graph
-        from ptcc_certify.certificate.section_writer import read_side_files
+        from ptcc_certify.certificate.section_io import read_side_files
         from ptcc_certify.graphs.difference import difference
         from ptcc_certify.graphs.family import Family
         from ptcc_certify.graphs.io.family_files import family_flags
@@ -108,7 +108,7 @@ class _Pair:
     def _family(self, options: shared.Options) -> Compared:
         """Compare families; the order of the files does not count."""
         from ptcc_certify.certificate.graph_sections import certificate_family
-        from ptcc_certify.certificate.section_writer import read_side_files
+        from ptcc_certify.certificate.section_io import read_side_files
         from ptcc_certify.graphs.difference import family_difference, mode_order
         from ptcc_certify.graphs.io.family_files import family_flags, read_family
 

@@ -17,13 +17,13 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from ptcc_certify.cli.declared import DECLARED, FILE, IN_LIBRARY, OF_PROTOCOL, TITLES, names_of
+from ptcc_certify.cli.click_options import DECLARED, FILE, IN_LIBRARY, OF_PROTOCOL, TITLES, names_of
 from ptcc_certify.cli.terminal import SCENARIO
 from ptcc_certify.errors import FormatError, ParameterError, PTCCError, did_you_mean
-from ptcc_certify.graphs.kinds_of_file import TOML, kind_of, refuse_as_graph
-from ptcc_certify.graphs.option import Option
+from ptcc_certify.graphs.declared_option import Option
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import OPTIONAL, UNCERTAINTY
+from ptcc_certify.graphs.recognised_files import TOML, kind_of, refuse_as_graph
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
 

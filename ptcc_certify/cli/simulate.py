@@ -23,7 +23,7 @@ from ptcc_certify.cli.agents import (
     run_in_places,
     run_of_agents,
 )
-from ptcc_certify.cli.declared import DIMENSION, SIGNAL, Command, click_option, flag_of, one_of
+from ptcc_certify.cli.click_options import DIMENSION, SIGNAL, Command, click_option, flag_of, one_of
 from ptcc_certify.cli.families import (
     dwell_of,
     dwell_options,
@@ -32,12 +32,18 @@ from ptcc_certify.cli.families import (
     refuse_options,
     refuse_restricted,
 )
-from ptcc_certify.cli.messages import asks_for_messages, leader_options, leaders_of, message_options, messages_of
+from ptcc_certify.cli.messages_and_leaders import (
+    asks_for_messages,
+    leader_options,
+    leaders_of,
+    message_options,
+    messages_of,
+)
 from ptcc_certify.cli.scenario import BESIDE
 from ptcc_certify.cli.terminal import FIGURES, print_lines, refuse_output
-from ptcc_certify.display import rendered
 from ptcc_certify.errors import ExitCode, ParameterError
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.lazy_report import rendered
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.case import Case
 from ptcc_certify.model.initial_state import InitialState
@@ -253,7 +259,7 @@ def _run_family(
 ) -> Trajectory:
     """Return the run of a family under a signal."""
     from ptcc_certify.simulation.run import simulate
-    from ptcc_certify.simulation.signals import RandomDwellSignal, as_signal
+    from ptcc_certify.simulation.switching_signals import RandomDwellSignal, as_signal
 
     refuse_options(options)
     if options["dimension"] > 1 or options["boundary_layer"] is not None:

@@ -22,7 +22,7 @@ import click
 from ptcc_certify.errors import ParameterError, PTCCError, one_line
 
 if TYPE_CHECKING:
-    from ptcc_certify.certificate.facts import Fact
+    from ptcc_certify.certificate.fact import Fact
     from ptcc_certify.errors import Change, Sentence
 
 #: What figures are written as; :mod:`ptcc_certify.report.plots.style` has them too.

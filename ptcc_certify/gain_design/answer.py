@@ -14,13 +14,13 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import down, float_up, up
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
+from ptcc_certify.certificate.assessment import CERTIFIED
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.exit_code import CERTIFIED
-from ptcc_certify.certificate.facts import Fact, Facts
+from ptcc_certify.certificate.fact import Fact, Facts
 from ptcc_certify.checker.input_formulas import Limits
-from ptcc_certify.display import Shown, rendered
 from ptcc_certify.gain_design.request import DesignRequest, Request, fit_of
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, short_exact
+from ptcc_certify.lazy_report import Shown, rendered
 from ptcc_certify.model import Protocol
 from ptcc_certify.model.parameters import parameter
 

@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 from ptcc_certify.checker.input_formulas import InitialSet, InputBounds
-from ptcc_certify.graphs.option import option
+from ptcc_certify.graphs.declared_option import option
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate

@@ -44,14 +44,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lmi.exact.decimal_rounding import up
-from ptcc_certify.bounds.input.initial_set import initial_set_within
+from ptcc_certify.bounds.input.initial_sets import initial_set_within
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker import INPUT_NODES
 from ptcc_certify.checker.input_formulas import InitialSet
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.gain_design.answer import INFEASIBLE, MET, UNPROVED, Design, refusal
-from ptcc_certify.gain_design.gains import Option, decimal, options
+from ptcc_certify.gain_design.gain_candidates import Option, decimal, options
 from ptcc_certify.gain_design.request import DesignRequest, Fit, fit_of
 from ptcc_certify.gain_design.shortest_possible import lower_product
 from ptcc_certify.graphs.rationals import nearest_float, shorten

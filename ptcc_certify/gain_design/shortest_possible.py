@@ -5,7 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 from lmi.exact.elementary_enclosures import rounded, sqrt
-from ptcc_certify.bounds.input.initial_set import ways
+from ptcc_certify.bounds.input.initial_sets import ways
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.checker import INPUT_NODES
 from ptcc_certify.checker.input_formulas import BITS, InitialSet, Linear

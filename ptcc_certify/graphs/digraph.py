@@ -18,20 +18,20 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
 
-from ptcc_certify.display import Shown
 from ptcc_certify.errors import FormatError, GraphError, NumberError, gated
-from ptcc_certify.graphs.equality import ReadOnly
+from ptcc_certify.graphs.array_holders import ReadOnly
+from ptcc_certify.graphs.labels import first_five, import_pandas, in_all, labels_beside, place_of, refuse_unnamed
+from ptcc_certify.graphs.packed_weights import LARGEST_WEIGHT, SMALLEST_WEIGHT, Weights
 from ptcc_certify.graphs.rationals import Exact, as_fraction, shorten, writable
 from ptcc_certify.graphs.reading import Reading
-from ptcc_certify.graphs.tables import first_five, import_pandas, in_all, labels_beside, place_of, refuse_unnamed
-from ptcc_certify.graphs.weights import LARGEST_WEIGHT, SMALLEST_WEIGHT, Weights
+from ptcc_certify.lazy_report import Shown
 
 if TYPE_CHECKING:
     import networkx as nx
     import pandas as pd
     from scipy import sparse
 
-    from ptcc_certify.graphs.io.rows import Rows
+    from ptcc_certify.graphs.io.raw_edges import Rows
 
 _SURROGATE_PAIR = re.compile("[\ud800-\udbff][\udc00-\udfff]")
 
@@ -192,7 +192,7 @@ class SignedDigraph(ReadOnly, Shown):
         >>> SignedDigraph.from_edges([("a", "b", 1)], orientation="listens").edges[0]
         ('b', 'a', Fraction(1, 1))
         """
-        from ptcc_certify.graphs.io.rows import Nodes, rows_of
+        from ptcc_certify.graphs.io.raw_edges import Nodes, rows_of
 
         if not isinstance(edges, Iterable):
             raise GraphError(f"{shorten(repr(edges))} is no list of edges; give triples (source, target, weight)")
@@ -271,7 +271,7 @@ class SignedDigraph(ReadOnly, Shown):
         >>> SignedDigraph.from_matrix([[0, -1], [0, 0]], orientation="information").edges
         (('1', '2', Fraction(-1, 1)),)
         """
-        from ptcc_certify.graphs.io.rows import rows_of
+        from ptcc_certify.graphs.io.raw_edges import rows_of
 
         if hasattr(matrix, "is_multigraph"):
             raise GraphError("a networkx graph is no matrix; it is read by SignedDigraph.from_networkx")
@@ -350,7 +350,7 @@ class SignedDigraph(ReadOnly, Shown):
         ((('ann', 'bob', Fraction(-2, 1)),), (('bob', 'ann', Fraction(-2, 1)),))
         """
         from ptcc_certify.graphs.io.attributes import values_of_edges
-        from ptcc_certify.graphs.io.rows import Nodes, rows_of
+        from ptcc_certify.graphs.io.raw_edges import Nodes, rows_of
 
         refuse_networkx(graph, undirected=undirected, multigraph=duplicates != "refuse")
         ends, data = [edge[:2] for edge in graph.edges], [more for *_, more in graph.edges(data=True)]

@@ -22,8 +22,8 @@ import numpy as np
 from ptcc_certify.errors import NumberError, ParameterError, gated
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io.files import parse_toml, read_bytes
+from ptcc_certify.graphs.packed_weights import Weights
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, given, parse_exact, shorten, whole_number
-from ptcc_certify.graphs.weights import Weights
 
 CONNECTIVITIES = ("strong", "quasi-strong", "weak", "disconnected")
 LARGEST_COUNT, LARGEST_SEED, LARGEST_ORDER = 10**6, 2**32 - 1, 10**6

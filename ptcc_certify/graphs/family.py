@@ -20,17 +20,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lmi.exact.decimal_rounding import counted
-from ptcc_certify.display import Shown
 from ptcc_certify.errors import GraphError, NumberError, ParameterError, did_you_mean, gated
 from ptcc_certify.graphs.digraph import (
     CallableTuple,
     Exact,
     SignedDigraph,
 )
+from ptcc_certify.graphs.labels import import_pandas, ordered_labels, refuse_unnamed
+from ptcc_certify.graphs.packed_weights import LARGEST_WEIGHT, SMALLEST_WEIGHT, Weights
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, nearest_float, shorten
 from ptcc_certify.graphs.reading import Reading
-from ptcc_certify.graphs.tables import import_pandas, ordered_labels, refuse_unnamed
-from ptcc_certify.graphs.weights import LARGEST_WEIGHT, SMALLEST_WEIGHT, Weights
+from ptcc_certify.lazy_report import Shown
 
 if TYPE_CHECKING:
     import pandas as pd

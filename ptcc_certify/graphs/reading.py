@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 from typing import Any, ClassVar
 
 from ptcc_certify.errors import FormatError, ParameterError, gated
-from ptcc_certify.graphs.option import Option, option
+from ptcc_certify.graphs.declared_option import Option, option
 from ptcc_certify.graphs.rationals import shorten
 
 _CHOICES = {"orientation": (None, "information", "listens"), "duplicates": ("refuse", "sum", "last")}

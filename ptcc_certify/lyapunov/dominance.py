@@ -35,7 +35,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import Dominance, GroupProof, LyapunovBlock, LyapunovFunction
-from ptcc_certify.theorems.composite import prove_connectivity
+from ptcc_certify.theorems.leaders_and_followers import prove_connectivity
 from ptcc_certify.theorems.lemmas import dyadic_left_vector, gauge, left_vector
 from ptcc_certify.theorems.matrix_arithmetic import diagonal_matrix, symmetric_product
 

@@ -245,7 +245,7 @@ def mean_constant(function: FamilyFunction, quotient: Quotient, q: Sequence[Frac
     Examples
     --------
     >>> from ptcc_certify.graphs.family import Family
-    >>> from ptcc_certify.lyapunov.undirected_family import undirected_function
+    >>> from ptcc_certify.lyapunov.common_left_vector import undirected_function
     >>> pair = Quotient(Family.from_intervals([("a", "b", 1, 3)], undirected=True))
     >>> mean_constant(undirected_function(pair), pair, [Fraction(1), Fraction(1)])
     Fraction(0, 1)

@@ -26,10 +26,10 @@ from lmi.errors import LMIError, NoCertificate, OutOfTime
 from lmi.search_time import checkpoint, part_of_time, share_of_time
 from ptcc_certify.checker.matrix_products import LARGEST_ROWS, WITH_MULTIPLIERS
 from ptcc_certify.graphs.size_limits import EXACT_NODES
+from ptcc_certify.lyapunov.common_left_vector import undirected_function
 from ptcc_certify.lyapunov.error_system import rounded_matrix
 from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends, prove_mode, with_constants
 from ptcc_certify.lyapunov.quotient import Quotient
-from ptcc_certify.lyapunov.undirected_family import undirected_function
 
 #: Classes of functions.
 KINDS = ("undirected", "diagonal", "full")

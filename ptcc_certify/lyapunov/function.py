@@ -19,7 +19,7 @@ import numpy as np
 import lmi
 from lmi.exact.decimal_rounding import float_down, float_up
 from lmi.sparse_definiteness_proofs import SparseDefinitenessProof
-from ptcc_certify.checker.quadratic_form import Form
+from ptcc_certify.checker.lyapunov_form import Form
 
 Matrix = list[list[Fraction]]
 

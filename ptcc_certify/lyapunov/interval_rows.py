@@ -23,8 +23,8 @@ import numpy as np
 from lmi.dyadic import dyadic_array
 from lmi.exact.fast import INT64_SAFE
 from ptcc_certify.graphs.family import Family, Mode
+from ptcc_certify.graphs.packed_weights import Weights
 from ptcc_certify.graphs.rationals import nearest_float
-from ptcc_certify.graphs.weights import Weights
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 from lmi.exact.decimal_rounding import counted
 from ptcc_certify.errors import Change, NumberError, ParameterError, Sentence, gated, joined
-from ptcc_certify.graphs.option import option
+from ptcc_certify.graphs.declared_option import option
 from ptcc_certify.graphs.rationals import Exact, as_fraction, no_number, shorten, whole_number
 from ptcc_certify.model.parameters import parameter, readable
 

@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import Any, ClassVar
 
 from ptcc_certify.errors import ParameterError, gated
-from ptcc_certify.graphs.option import option
+from ptcc_certify.graphs.declared_option import option
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.model.parameters import parameter
 

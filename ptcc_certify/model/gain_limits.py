@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from ptcc_certify.checker.input_formulas import Limits
 from ptcc_certify.errors import gated
-from ptcc_certify.graphs.option import option
+from ptcc_certify.graphs.declared_option import option
 from ptcc_certify.model.parameters import Given, Parameters
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from ptcc_certify.errors import gated
-from ptcc_certify.graphs.option import option
+from ptcc_certify.graphs.declared_option import option
 
 
 @gated

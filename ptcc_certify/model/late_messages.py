@@ -15,7 +15,7 @@ from numbers import Integral
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ptcc_certify.errors import ParameterError, gated
-from ptcc_certify.graphs.option import option
+from ptcc_certify.graphs.declared_option import option
 from ptcc_certify.graphs.rationals import Exact, shorten
 from ptcc_certify.model.parameters import Given, NotNegative, parameter, readable
 

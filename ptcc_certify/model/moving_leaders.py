@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from lmi.exact.decimal_rounding import near
 from ptcc_certify.errors import ParameterError, gated
-from ptcc_certify.graphs.option import option
+from ptcc_certify.graphs.declared_option import option
 from ptcc_certify.model.parameters import Given, NotNegative, Parameters
 
 if TYPE_CHECKING:

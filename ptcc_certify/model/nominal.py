@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ptcc_certify.errors import ParameterError, gated
-from ptcc_certify.graphs.option import option
+from ptcc_certify.graphs.declared_option import option
 from ptcc_certify.model.base import Protocol, aligned, position_latex, symbols
 from ptcc_certify.model.casadi_latex import to_latex
 from ptcc_certify.model.parameters import NotNegative, Positive

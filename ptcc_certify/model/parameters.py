@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Any, Self, overload
 
 from ptcc_certify.errors import NumberError, ParameterError, gated
-from ptcc_certify.graphs.option import Option
+from ptcc_certify.graphs.declared_option import Option
 from ptcc_certify.graphs.rationals import Exact, as_fraction, no_number, shorten
 
 _SMALLEST, _LARGEST = Fraction(1, 10**300), Fraction(10**300)

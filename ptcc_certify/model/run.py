@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ptcc_certify.graphs.option import option
+from ptcc_certify.graphs.declared_option import option
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,8 +7,8 @@ it holds.
 
 :mod:`~ptcc_certify.report.report_file` checks the file and writes either. :mod:`~ptcc_certify.report.page` fills the
 templates of the page; :mod:`~ptcc_certify.report.statement` is the LaTeX. Both take numbers and words from
-:mod:`~ptcc_certify.report.notation`, which rounds what was proved to the safe side, and figures from
-:mod:`~ptcc_certify.report.figures`. This package itself loads none of them: the screen needs no template.
+:mod:`~ptcc_certify.report.html_text`, which rounds what was proved to the safe side, and figures from
+:mod:`~ptcc_certify.report.page_figures`. This package itself loads none of them: the screen needs no template.
 """
 
 from ptcc_certify import modules_of

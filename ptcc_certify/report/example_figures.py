@@ -12,7 +12,7 @@ from matplotlib import style
 from matplotlib.figure import Figure
 
 from ptcc_certify.report.example_results import Run
-from ptcc_certify.report.figures import PLOTS
+from ptcc_certify.report.page_figures import PLOTS
 from ptcc_certify.report.plots.style import DOUBLE_COLUMN, SINGLE_COLUMN, STYLE, new_axes, share_legend
 
 #: The plots of those figures of the paper that have a name of their own.

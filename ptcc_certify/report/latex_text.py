@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from ptcc_certify.errors import Sentence, spell
 from ptcc_certify.model.casadi_latex import symbol_latex
-from ptcc_certify.report.notation import LETTERS, as_parameters, labels_apart
+from ptcc_certify.report.html_text import LETTERS, as_parameters, labels_apart
 from ptcc_certify.report.text_layout import NO_BREAK
 
 _TEX = {c: f"\\{c}" for c in "{}$&#%_"}

@@ -1,7 +1,7 @@
 """What a notebook shows of a graph, a family, a structure, a certificate, a trajectory, a design: a table, a figure.
 
-What :class:`ptcc_certify.display.Shown` calls for ``_repr_html_``; elsewhere the plain ``repr`` is shown. Labels are
-escaped, figures are inline SVG images with a text in their place for those who do not see them.
+What :class:`ptcc_certify.lazy_report.Shown` calls for ``_repr_html_``; elsewhere the plain ``repr`` is shown. Labels
+are escaped, figures are inline SVG images with a text in their place for those who do not see them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from functools import singledispatch
 from typing import Any
 
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.facts import Fact
+from ptcc_certify.certificate.fact import Fact
 from ptcc_certify.errors import PTCCError
 from ptcc_certify.gain_design.agents_answer import AgentsDesign
 from ptcc_certify.gain_design.answer import Design
@@ -25,7 +25,7 @@ from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.report.facts.graph import family_text
 from ptcc_certify.report.facts.of_certificate import facts_of
 from ptcc_certify.report.facts.of_structure import decision_facts, design_facts, structure_facts
-from ptcc_certify.report.figures import draw
+from ptcc_certify.report.page_figures import draw
 from ptcc_certify.report.plots.agents_motion import plot_motion
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.style import figure_bytes

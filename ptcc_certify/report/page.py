@@ -25,23 +25,23 @@ from lmi.exact.decimal_rounding import counted
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certificate_file import RejectedCertificate
 from ptcc_certify.certificate.constrained_switching.bounds import nearer_for_signal
-from ptcc_certify.certificate.family_comparison import compare
+from ptcc_certify.certificate.runs_against_bounds import compare
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.obligations import VerifiedObligation
 from ptcc_certify.errors import Change, Sentence, spell
 from ptcc_certify.graphs.io.graph_files import reading_flags
 from ptcc_certify.model.agents import plant_text
-from ptcc_certify.report import notation as texts
+from ptcc_certify.report import html_text as texts
 from ptcc_certify.report.facts.claim import assumptions
+from ptcc_certify.report.facts.constrained_switching import signal_text
 from ptcc_certify.report.facts.decay import BOUND_KINDS
 from ptcc_certify.report.facts.graph import leader_facts
 from ptcc_certify.report.facts.of_certificate import facts_of
-from ptcc_certify.report.facts.signals import signal_text
-from ptcc_certify.report.figures import Counterexamples, counterexamples, draw, inline_figure, run_of_agents
-from ptcc_certify.report.notation import rational
+from ptcc_certify.report.html_text import rational
+from ptcc_certify.report.page_figures import Counterexamples, counterexamples, draw, inline_figure, run_of_agents
+from ptcc_certify.report.page_states_table import ROWS, states_table
 from ptcc_certify.report.plots.runs import keeps_promise
 from ptcc_certify.report.plots.subject import ideal_text, limits_text
-from ptcc_certify.report.states_table import ROWS, states_table
 from ptcc_certify.report.text_layout import arithmetic
 from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.simulation.trajectory import Trajectory
@@ -357,7 +357,7 @@ def _bound_words(saved: Certificate) -> list[Markup]:
     part = min(parts, key=lambda p: p.upper_bound.value)  # type: ignore[union-attr]
     bound, family = part.upper_bound, saved.family_proof.family
     assert bound is not None
-    from ptcc_certify.certificate.unverified import upper_bound_entry
+    from ptcc_certify.certificate.unverified_section import upper_bound_entry
     from ptcc_certify.lyapunov.quotient import Quotient
 
     lines = []

@@ -8,7 +8,7 @@ from itertools import dropwhile, takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ptcc_certify.certificate.facts import Fact
+from ptcc_certify.certificate.fact import Fact
 from ptcc_certify.errors import PTCCError, Spelling, spell
 from ptcc_certify.report.facts.claim import WHATEVER
 from ptcc_certify.report.text_layout import TEXT, columns, format_lines, wrap_lines
@@ -146,7 +146,7 @@ def _file_claim(claim: Mapping[str, str]) -> str:
 def _file_facts(path: str, document: Mapping[str, Any], report: CheckReport) -> list[Fact]:
     """Return the facts of an accepted certificate, of a graph or a family, as its file says it."""
     from ptcc_certify.certificate.certificate import accepted_certificate
-    from ptcc_certify.certificate.section_writer import read_side_files
+    from ptcc_certify.certificate.section_io import read_side_files
     from ptcc_certify.report.facts.of_certificate import facts_of
 
     origins = dict.fromkeys(("x(0)", "v(0)", "a(0)", "sigma(0)"), "as in the file")

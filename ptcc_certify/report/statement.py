@@ -17,21 +17,21 @@ from markupsafe import Markup
 
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.constrained_switching.claims import WindowClaim
-from ptcc_certify.certificate.constrained_switching.states import states_of_signal
+from ptcc_certify.certificate.constrained_switching.final_states import states_of_signal
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import STABILITY
 from ptcc_certify.model.agents import plant_text
 from ptcc_certify.model.casadi_latex import symbol_latex
-from ptcc_certify.report import notation as texts
+from ptcc_certify.report import html_text as texts
 from ptcc_certify.report.facts.agents import claimed_of
 from ptcc_certify.report.facts.claim import assumptions, sharpest
+from ptcc_certify.report.facts.constrained_switching import signal_text
 from ptcc_certify.report.facts.of_certificate import facts_of
-from ptcc_certify.report.facts.signals import signal_text
 from ptcc_certify.report.latex_text import latex_of_number, latex_of_sentence, latex_of_text
 from ptcc_certify.report.page import THEOREM, protocol_latex
+from ptcc_certify.report.page_states_table import state_rows
 from ptcc_certify.report.plots.subject import ideal_text
-from ptcc_certify.report.states_table import state_rows
 from ptcc_certify.report.text_layout import arithmetic
 from ptcc_certify.theorems.counterexample_text import mode_name
 from ptcc_certify.theorems.family_behaviour import DEPENDS

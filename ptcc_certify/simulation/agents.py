@@ -21,7 +21,7 @@ from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.rationals import shorten, whole_number
 from ptcc_certify.model.agents_protocol import AgentsProtocol
 from ptcc_certify.simulation.cvodes import Motion, Phase, Tolerances
-from ptcc_certify.simulation.members import Members
+from ptcc_certify.simulation.member_laplacians import Members
 from ptcc_certify.simulation.trajectory import ByAgent, csv_text
 
 if TYPE_CHECKING:

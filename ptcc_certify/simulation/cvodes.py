@@ -17,7 +17,7 @@ from ptcc_certify.errors import SimulationError
 from ptcc_certify.graphs.rationals import number_within
 from ptcc_certify.model.disturbance import Disturbance, ExpressionDisturbance, WorstCaseDisturbance
 from ptcc_certify.simulation.interrupt import interruptible
-from ptcc_certify.simulation.members import Choice, Members
+from ptcc_certify.simulation.member_laplacians import Choice, Members
 
 if TYPE_CHECKING:
     import casadi as ca

@@ -36,7 +36,7 @@ from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.refusals import refuse_together
 from ptcc_certify.simulation.cvodes import Tolerances
 from ptcc_certify.simulation.instants import steps_towards
-from ptcc_certify.simulation.members import Choice, Members
+from ptcc_certify.simulation.member_laplacians import Choice, Members
 from ptcc_certify.simulation.trajectory import Conditions, Trajectory
 
 Pattern = Literal["oldest", "fresh", "varying", "square"]

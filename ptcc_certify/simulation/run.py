@@ -30,15 +30,15 @@ from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.refusals import refuse_together
-from ptcc_certify.simulation.course import Course
 from ptcc_certify.simulation.cvodes import Motion, Tolerances
 from ptcc_certify.simulation.instants import PAST, Instants, default_instants, wanted_instants
 from ptcc_certify.simulation.interrupt import interruptible
 from ptcc_certify.simulation.late_messages import simulate_late
-from ptcc_certify.simulation.members import Choice, Members
+from ptcc_certify.simulation.member_laplacians import Choice, Members
 from ptcc_certify.simulation.nominal import Bounded, as_forcing, forced, sample_and_hold
-from ptcc_certify.simulation.signals import ConstantSignal, Signal, as_signal
 from ptcc_certify.simulation.sliding import SlidingMotion, rounding_slack
+from ptcc_certify.simulation.switched_motion import Course
+from ptcc_certify.simulation.switching_signals import ConstantSignal, Signal, as_signal
 from ptcc_certify.simulation.trajectory import RESOLVED, Conditions, Played, Trajectory
 
 if TYPE_CHECKING:
@@ -115,7 +115,8 @@ def simulate(
         agents: the protocol acts as ``L kron I_S``, so both evolve alike. Sliding mode, families: one column.
     signal : Signal, str, path, file object or sequence of rows, optional
         Of a family: ``"random"``, the default, ``"worst-case"``, ``"constant"``, a table of instants and modes, or a
-        :class:`~ptcc_certify.simulation.signals.Signal`: see :func:`~ptcc_certify.simulation.signals.as_signal`.
+        :class:`~ptcc_certify.simulation.switching_signals.Signal`: see
+        :func:`~ptcc_certify.simulation.switching_signals.as_signal`.
         ``X' = -gain(t) L(t) X``, the signal choosing ``L(t)``. With ``messages`` how old is what agents hear: a pattern
         of :func:`ptcc_certify.simulate_late`, or that and a seed, ``("varying", 3)``.
     sigma0 : state-like, optional

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ptcc_certify.display import Shown, rendered
 from ptcc_certify.errors import ParameterError, gated
-from ptcc_certify.graphs.equality import ByValue
+from ptcc_certify.graphs.array_holders import ByValue
+from ptcc_certify.graphs.labels import import_pandas, position
 from ptcc_certify.graphs.rationals import number_within, shorten
-from ptcc_certify.graphs.tables import import_pandas, position
-from ptcc_certify.simulation.members import Choice, Members
+from ptcc_certify.lazy_report import Shown, rendered
+from ptcc_certify.simulation.member_laplacians import Choice, Members
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -28,7 +28,7 @@ from lmi.dyadic import round_to_bits
 from lmi.errors import NoCertificate
 from lmi.exact import arithmetic
 from lmi.exact.decimal_rounding import down
-from lmi.exact.matrix_polynomials import nonnegative_between, semidefinite
+from lmi.exact.matrix_polynomial_sign import nonnegative_between, semidefinite
 from lmi.exact.numbers import integers
 from lmi.feedback import feedback_matrix, later_matrices
 from ptcc_certify.checker.agent_bounds import adjugate

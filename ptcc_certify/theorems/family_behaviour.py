@@ -24,7 +24,6 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.decimal_rounding import counted
-from ptcc_certify.display import Shown, rendered
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.io import as_family
@@ -40,6 +39,7 @@ from ptcc_certify.graphs.structure import (
     find_camps,
     weak_components,
 )
+from ptcc_certify.lazy_report import Shown, rendered
 from ptcc_certify.theorems.family_kernel import Kernel, StateEnclosure, TooLarge, first_answer
 
 __all__ = ["DEPENDS", "SIGNALS", "Counterexample", "FamilyComponent", "Kernel", "TooLarge", "decide"]

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.labels import place_of
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.graphs.tables import place_of
 from ptcc_certify.theorems.lemmas import solve_exact
 
 #: A row of the basis that is neither zero nor, up to its sign, a unit vector.

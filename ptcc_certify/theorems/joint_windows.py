@@ -2,7 +2,8 @@
 
 With ``D`` at least every sum of ``w+`` into a node, ``w`` the least mandatory weight, windows of length ``h`` in which
 every edge is on for ``d`` at least, and ``eta <= e^(-D h) min(1, d w)``, the contractions of
-:mod:`ptcc_certify.theorems.family_rate` hold in ``N h`` and ``(N - 1) h`` (docs/theory/families.md, "Joint windows").
+:mod:`ptcc_certify.theorems.explicit_family_rate` hold in ``N h`` and ``(N - 1) h`` (docs/theory/families.md, "Joint
+windows").
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
 from ptcc_certify.model.constrained_switching import JointWindows
 from ptcc_certify.model.parameters import readable
+from ptcc_certify.theorems.explicit_family_rate import ExplicitRate, largest_sum, least_mandatory
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
-from ptcc_certify.theorems.family_rate import ExplicitRate, largest_sum, least_mandatory
 
 _BITS = 53
 

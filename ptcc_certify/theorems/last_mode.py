@@ -16,7 +16,7 @@ from ptcc_certify.graphs.structure import (
     find_camps,
 )
 from ptcc_certify.theorems.family_behaviour import CHAIN, FamilyComponent
-from ptcc_certify.theorems.family_claims import GENERAL
+from ptcc_certify.theorems.family_special_cases import GENERAL
 
 
 def last_mode_behaviours(component: FamilyComponent) -> tuple[str | None, ...]:

@@ -1,6 +1,6 @@
 """Theorem 2: quasi-strongly connected signed digraphs: one closed component, and followers."""
 
-from ptcc_certify.theorems.composite import BalancedComposite, Composite
+from ptcc_certify.theorems.leaders_and_followers import BalancedComposite, Composite
 
 
 class BalancedQuasiStrong(BalancedComposite):

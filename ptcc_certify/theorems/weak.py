@@ -3,7 +3,7 @@
 The block-triangular argument needs no weak connectivity, so the same Lyapunov functions serve disconnected graphs.
 """
 
-from ptcc_certify.theorems.composite import BalancedComposite, Composite
+from ptcc_certify.theorems.leaders_and_followers import BalancedComposite, Composite
 
 
 class BalancedWeak(BalancedComposite):

@@ -8,7 +8,7 @@ import flint
 import numpy as np
 import pytest
 
-from ptcc_certify.bounds.agents.motion import common_motion
+from ptcc_certify.bounds.agents.common_motion import common_motion
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.model.gain import Gain
 

@@ -20,7 +20,7 @@ from selection import thinned
 from ptcc_certify.bounds.final_state.of_graph import final_state
 from ptcc_certify.bounds.input.effort import Effort, EnergyIntegral
 from ptcc_certify.bounds.input.effort_bounds import InputRequest, bound_effort
-from ptcc_certify.bounds.input.initial_set import ellipsoid, initial_set_within
+from ptcc_certify.bounds.input.initial_sets import ellipsoid, initial_set_within
 from ptcc_certify.bounds.input.worst_initial_state import worst_initial_state
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certification import certify

@@ -21,7 +21,7 @@ from scipy.linalg import expm
 
 from ptcc_certify.batch import certify_many
 from ptcc_certify.bounds.final_state.of_graph import final_state, influence
-from ptcc_certify.bounds.input.initial_set import box, ellipsoid
+from ptcc_certify.bounds.input.initial_sets import box, ellipsoid
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph

@@ -30,13 +30,13 @@ from ptcc_certify.bounds.final_state.of_graph import final_state
 from ptcc_certify.bounds.tracking import bound_tracking, drift_integral
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.certification import certify
+from ptcc_certify.checker.drift_by_leaders import drift_above
 from ptcc_certify.checker.input_formulas import PrescribedGain
-from ptcc_certify.checker.late_drift import drift_above
 from ptcc_certify.checker.late_input import gain_above
 from ptcc_certify.errors import HypothesisError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure, analyse
-from ptcc_certify.lyapunov.follower_rows import FollowerRows
+from ptcc_certify.lyapunov.late_follower_rows import FollowerRows
 from ptcc_certify.model import NominalProtocol
 from ptcc_certify.model.asks import Asks, Expectations
 from ptcc_certify.model.late_messages import LateMessages

@@ -15,9 +15,9 @@ from asked import certify_words
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
+from ptcc_certify.certificate.assessment import MET, OPEN, REFUTED
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.certification import certify
-from ptcc_certify.certificate.exit_code import MET, OPEN, REFUTED
 from ptcc_certify.checker import check
 from ptcc_certify.checker.input_formulas import InitialSet
 from ptcc_certify.errors import Change, ParameterError, spell

@@ -175,7 +175,7 @@ def with_larger_alpha(part: CascadePart) -> CascadePart:
 
 @pytest.mark.parametrize("change", [with_smaller_roots, with_faster_functions, with_larger_alpha])
 def test_false_bounds_are_below_where_agents_are_enclosed_and_below_a_run(change: Any):
-    """Also below one that is judged above the floor of :data:`~ptcc_certify.bounds.agents.comparison.RESOLVED`."""
+    """Also below one that is judged above :data:`~ptcc_certify.bounds.agents.run_against_bounds.RESOLVED`."""
     for seed in (5, 12, 13, 15):
         certificate = certified(case_of(seed), ("paper", "best")[seed % 2], simulation=False)
         part = part_of(certificate)

@@ -30,7 +30,7 @@ from ptcc_certify.certificate import graph_certification
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.certificate.graph_sections import structure_document
-from ptcc_certify.certificate.section_writer import exact_or_ball
+from ptcc_certify.certificate.section_io import exact_or_ball
 from ptcc_certify.checker import OBLIGATIONS, CheckReport, UnreadableError, check, digest, read
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import GRAPHS, load_graph, select

@@ -19,7 +19,7 @@ from ptcc_certify import Family, NominalProtocol, SlidingModeProtocol
 from ptcc_certify.bounds.final_state.of_family import value_ends
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.constrained_switching.claims import FinalValueClaim
-from ptcc_certify.certificate.constrained_switching.states import constant_states
+from ptcc_certify.certificate.constrained_switching.final_states import constant_states
 from ptcc_certify.checker import check
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.screen import certificate_lines, summary_lines

@@ -9,13 +9,13 @@ from asked import certify_family
 from common_kernel_families import KINDS, random_family
 from scipy.linalg import expm
 
-from ptcc_certify.certificate.family_comparison import compare, functions_of, worst_case_signals
+from ptcc_certify.certificate.runs_against_bounds import compare, functions_of, worst_case_signals
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.model import NominalProtocol
-from ptcc_certify.simulation.members import Members
+from ptcc_certify.simulation.member_laplacians import Members
 from ptcc_certify.simulation.run import simulate
-from ptcc_certify.simulation.signals import ConstantSignal, PeriodicSignal, RandomSignal
+from ptcc_certify.simulation.switching_signals import ConstantSignal, PeriodicSignal, RandomSignal
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
 RATIOS = ("deviation_ratio", "final_ratio", "input_ratio", "lyapunov_ratio", "mode_ratio")

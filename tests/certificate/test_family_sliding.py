@@ -15,8 +15,8 @@ from scipy.integrate import quad
 from selection import thinned
 
 from ptcc_certify.certificate.certificate import read_certificate
-from ptcc_certify.certificate.family_comparison import compare, functions_of, worst_case_signals
 from ptcc_certify.certificate.family_proof import ComponentProof
+from ptcc_certify.certificate.runs_against_bounds import compare, functions_of, worst_case_signals
 from ptcc_certify.checker import check, digest
 from ptcc_certify.checker.family_sliding import Drive, drive_sizes
 from ptcc_certify.checker.input_formulas import root_above
@@ -26,9 +26,9 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.follower_function import follower_functions
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.reaching_time import certified_reaching_times
-from ptcc_certify.simulation.members import Members
+from ptcc_certify.simulation.member_laplacians import Members
 from ptcc_certify.simulation.run import simulate
-from ptcc_certify.simulation.signals import ConstantSignal, PeriodicSignal, RandomSignal, Signal, Stretch
+from ptcc_certify.simulation.switching_signals import ConstantSignal, PeriodicSignal, RandomSignal, Signal, Stretch
 from ptcc_certify.theorems.family_behaviour import decide
 
 PROTOCOL = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=3, mu1=2, mu2=1, mu3=1, delta=1)

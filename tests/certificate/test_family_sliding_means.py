@@ -10,7 +10,7 @@ from asked import certify_family
 from common_kernel_families import random_family
 
 from ptcc_certify.certificate.certificate import read_certificate
-from ptcc_certify.certificate.family_comparison import compare
+from ptcc_certify.certificate.runs_against_bounds import compare
 from ptcc_certify.checker import check, digest
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
@@ -21,7 +21,7 @@ from ptcc_certify.report.plots.input import plot_input
 from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.report.statement import report_latex
 from ptcc_certify.simulation.run import simulate
-from ptcc_certify.simulation.signals import RandomSignal
+from ptcc_certify.simulation.switching_signals import RandomSignal
 
 PROTOCOL = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=3, mu1=2, mu2=1, mu3=1, delta=1)
 PATH = Family.from_intervals([("a", "b", 1, 2), ("b", "c", -3, -1)], undirected=True)

@@ -26,11 +26,11 @@ from ptcc_certify import (
     certify,
     read_graph,
 )
-from ptcc_certify.bounds.delay import missed_deadline
-from ptcc_certify.bounds.delay.missed_deadline import Missed
+from ptcc_certify.bounds.delay import certain_misses
+from ptcc_certify.bounds.delay.certain_misses import Missed
 from ptcc_certify.certificate import document
+from ptcc_certify.certificate.assessment import Answer, standing
 from ptcc_certify.certificate.certificate_file import RejectedCertificate
-from ptcc_certify.certificate.exit_code import Answer, standing
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.final_state import WIDEST
 from ptcc_certify.graphs.structure import analyse
@@ -171,7 +171,7 @@ def test_where_the_check_rejects_nothing_is_saved(rejecting: Path):
 
 def test_a_refutation_rests_on_what_the_check_accepts(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
     """An agent that is said to miss the deadline by more than is so: rejected, and no answer."""
-    honest: Callable[..., Missed | None] = missed_deadline.find_missed
+    honest: Callable[..., Missed | None] = certain_misses.find_missed
 
     def more(*case: Any) -> Missed | None:
         found = honest(*case)

@@ -32,7 +32,7 @@ from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.model.asks import Expectations
 from ptcc_certify.model.constrained_switching import ClockShares, DwellTime, JointWindows
-from ptcc_certify.report.facts.signals import signal_facts
+from ptcc_certify.report.facts.constrained_switching import signal_facts
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.screen import certificate_lines, summary_lines
 from ptcc_certify.report.statement import report_latex

@@ -28,9 +28,9 @@ from ptcc_certify import (
     ellipsoid,
     read_certificate,
 )
-from ptcc_certify.bounds.input.initial_set import initial_set_within
+from ptcc_certify.bounds.input.initial_sets import initial_set_within
+from ptcc_certify.certificate.assessment import exit_code, worst_code
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.exit_code import exit_code, worst_code
 from ptcc_certify.certificate.usefulness import LAST
 from ptcc_certify.errors import Change
 from ptcc_certify.examples import load_graph

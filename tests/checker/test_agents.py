@@ -29,7 +29,7 @@ from oracle_agents import false_claims_of_agents
 
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.certificate.json_schema import json_schema
-from ptcc_certify.checker import agent_motion, check
+from ptcc_certify.checker import check, common_motion
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.model import NominalProtocol
@@ -598,5 +598,5 @@ def test_what_the_program_makes_is_true_and_stays_so(seed: int):
 
 def test_final_states_that_cost_too_much_are_refused_before_they_are_read(monkeypatch: pytest.MonkeyPatch):
     data = made()
-    monkeypatch.setattr(agent_motion, "ENTRY", 10**10)
+    monkeypatch.setattr(common_motion, "ENTRY", 10**10)
     rejected(data, "agent-final-state|agents", "the final states of agents would take too long")

@@ -39,9 +39,9 @@ from lmi.exact.polynomials import rank, row_sum
 from ptcc_certify import checker
 from ptcc_certify.bounds.final_state import enclosed_ends
 from ptcc_certify.bounds.final_state import of_graph as final_states
-from ptcc_certify.bounds.input.initial_set import box, ellipsoid
+from ptcc_certify.bounds.input.initial_sets import box, ellipsoid
 from ptcc_certify.certificate import graph_certification
-from ptcc_certify.certificate import section_writer as vectors
+from ptcc_certify.certificate import section_io as vectors
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.certificate.checking import record

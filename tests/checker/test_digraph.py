@@ -20,8 +20,8 @@ from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker.array_digraph import ArrayDigraph
 from ptcc_certify.checker.contents import GraphCertificate
 from ptcc_certify.checker.digraph import Digraph
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.graph import check_graph
-from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError
 from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.graphs.digraph import SignedDigraph

@@ -27,7 +27,7 @@ from oracle_family_certificates import FamilyOracle, false_family_claims
 from selection import thinned
 
 from ptcc_certify import checker
-from ptcc_certify.certificate import section_writer
+from ptcc_certify.certificate import section_io
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.certificate_file import RejectedCertificate
 from ptcc_certify.certificate.document import certificate_document
@@ -898,7 +898,7 @@ def test_a_file_that_is_rejected_is_not_read(tmp_path: Path):
 
 
 def test_many_edges_are_read_from_side_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(section_writer, "LONG", 2)
+    monkeypatch.setattr(section_io, "LONG", 2)
     edges = [("a", "b", 1, 2), ("b", "a", "0", "0.1"), ("b", "a", "-0.25", 0), ("a", "c", -3, -3)]
     made = certificate(Family.from_intervals(edges), state=False)
     made.save(tmp_path / "c.json")

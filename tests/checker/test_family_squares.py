@@ -14,10 +14,10 @@ from asked import certify_family
 from mutations import Json, changed, resealed
 from row_families import bounds_of
 
-from ptcc_certify.certificate import family_certification, section_writer
+from ptcc_certify.certificate import family_certification, section_io
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
-from ptcc_certify.certificate.family_comparison import compare
 from ptcc_certify.certificate.graph_sections import certificate_family, family_sections
+from ptcc_certify.certificate.runs_against_bounds import compare
 from ptcc_certify.checker import check
 from ptcc_certify.checker.reading import exact
 from ptcc_certify.graphs.family import Family
@@ -99,7 +99,7 @@ def test_files_are_read_back(tmp_path: Path):
 
 
 def test_long_vectors_and_factors_go_to_side_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(section_writer, "LONG", 100)
+    monkeypatch.setattr(section_io, "LONG", 100)
     cert = certify_family(certificate(1).family, PROTOCOL)
     cert.save(tmp_path / "c.json")
     assert {path.name.split("-", 1)[1] for path in tmp_path.glob("*.npy")} >= {"vector.npy", "data.npy", "indices.npy"}

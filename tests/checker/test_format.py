@@ -24,7 +24,7 @@ from ptcc_certify import checker
 from ptcc_certify.bounds.final_state import enclosed_ends
 from ptcc_certify.bounds.final_state import of_graph as final_states
 from ptcc_certify.certificate import graph_certification
-from ptcc_certify.certificate import section_writer as vectors
+from ptcc_certify.certificate import section_io as vectors
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.certificate.json_schema import json_schema
 from ptcc_certify.checker import MANY_COMPONENTS, OBLIGATIONS, check

@@ -25,7 +25,7 @@ from random_mutants import SEED, numbers, pick
 from true_certificates import cases, more_cases
 
 import ptcc_certify
-from ptcc_certify.cli.verified import executable
+from ptcc_certify.cli.proved_checker import executable
 from ptcc_certify.errors import ParameterError
 
 MEMORY, SECONDS = 10**9, 10

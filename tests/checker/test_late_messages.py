@@ -24,9 +24,9 @@ from ptcc_certify.certificate.certification import certify
 from ptcc_certify.certificate.json_schema import json_schema
 from ptcc_certify.checker import check, graph
 from ptcc_certify.checker.array_digraph import ArrayDigraph
-from ptcc_certify.checker.array_steps import ArraySteps
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.late_steps import Steps, decay_above
+from ptcc_certify.checker.late_steps_arrays import ArraySteps
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
@@ -148,7 +148,7 @@ def test_what_follows_is_accepted_with_and_without_arrays_and_has_the_shape_of_t
     data = samples()[name]
     VALIDATOR.validate(data)
     monkeypatch.setattr(graph, "MANY_EDGES", 0)
-    monkeypatch.setattr("ptcc_certify.checker.messages.MANY_EDGES", 0)
+    monkeypatch.setattr("ptcc_certify.checker.late_messages.MANY_EDGES", 0)
     reports = [check(data), check(data, stdlib=True)]
     for report in reports:
         assert report.accepted, (report.rejected, report.reason)

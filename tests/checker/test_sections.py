@@ -17,7 +17,7 @@ from ptcc_certify.checker.contents import BRINGS, FamilyCertificate, GraphCertif
 from ptcc_certify.checker.input import Box
 from ptcc_certify.checker.obligations import OBLIGATIONS
 from ptcc_certify.checker.reading import SCHEMA, RejectedError
-from ptcc_certify.checker.sections import (
+from ptcc_certify.checker.section_declarations import (
     ByNumber,
     Context,
     FewAgents,

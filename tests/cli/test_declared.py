@@ -15,8 +15,8 @@ from click.testing import CliRunner
 
 import ptcc_certify
 from ptcc_certify.cli import cli
-from ptcc_certify.cli.declared import DECLARED, OF_PROTOCOL, TITLES, given_of, options_for
-from ptcc_certify.graphs.option import option, options_of
+from ptcc_certify.cli.click_options import DECLARED, OF_PROTOCOL, TITLES, given_of, options_for
+from ptcc_certify.graphs.declared_option import option, options_of
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.parameters import Given
 

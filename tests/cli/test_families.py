@@ -11,7 +11,7 @@ from bad_inputs import ptcc
 from selection import thinned
 
 from ptcc_certify import NominalProtocol, certify
-from ptcc_certify.certificate.exit_code import CERTIFIED
+from ptcc_certify.certificate.assessment import CERTIFIED
 from ptcc_certify.graphs.io import read_family
 from ptcc_certify.report.facts.claim import _cut
 from ptcc_certify.report.text_layout import wrap_text

@@ -29,7 +29,7 @@ from ptcc_certify import (
     read_graph,
     simulate,
 )
-from ptcc_certify.certificate import section_writer
+from ptcc_certify.certificate import section_io
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.simulation.late_messages import simulate_late
@@ -465,7 +465,7 @@ def test_commands_that_would_leave_late_messages_out_refuse_their_scenario(words
 
 
 def test_delays_of_many_edges_stand_in_a_side_file(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(section_writer, "LONG", 3)
+    monkeypatch.setattr(section_io, "LONG", 3)
     run = ptcc("certify", "team.csv", "--delay", "delay", *START, *QUICK, "-o", "c.json")
     assert run.code == ptcc("check", "c.json").code == 0, run
     section, messages = json.loads(Path("c.json").read_text())["messages"], read_certificate("c.json").late.messages

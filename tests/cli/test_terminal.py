@@ -14,7 +14,7 @@ import pytest
 from bad_inputs import ptcc
 from rich.cells import cell_len
 
-from ptcc_certify.certificate.facts import Fact
+from ptcc_certify.certificate.fact import Fact
 from ptcc_certify.cli import terminal
 from ptcc_certify.examples import GRAPHS
 

@@ -25,7 +25,7 @@ from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker import check
 from ptcc_certify.checker.input_formulas import InitialSet
 from ptcc_certify.checker.obligations import OBLIGATIONS
-from ptcc_certify.cli.verified import VARIABLE, executable, verified_check
+from ptcc_certify.cli.proved_checker import VARIABLE, executable, verified_check
 from ptcc_certify.errors import FormatError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family

@@ -12,7 +12,7 @@ import pytest
 from mutations import resealed
 
 from ptcc_certify.checker import check
-from ptcc_certify.cli.verified import executable
+from ptcc_certify.cli.proved_checker import executable
 from ptcc_certify.errors import ParameterError
 
 Path_ = tuple[str | int, ...]

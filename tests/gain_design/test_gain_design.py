@@ -13,14 +13,14 @@ from scipy.linalg import expm
 from selection import thinned
 
 from ptcc_certify.bounds.final_state.of_graph import influence
-from ptcc_certify.bounds.input.initial_set import box, ellipsoid
+from ptcc_certify.bounds.input.initial_sets import box, ellipsoid
 from ptcc_certify.bounds.input.tightest_bound import usable_functions
 from ptcc_certify.checker.input_formulas import InitialSet
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import GRAPHS, load_graph
 from ptcc_certify.gain_design import search
 from ptcc_certify.gain_design.answer import INFEASIBLE, MET, UNPROVED
-from ptcc_certify.gain_design.gains import Option, least_peak, peak_factor
+from ptcc_certify.gain_design.gain_candidates import Option, least_peak, peak_factor
 from ptcc_certify.gain_design.request import input_bounds
 from ptcc_certify.gain_design.search import _at, design
 from ptcc_certify.graphs.digraph import SignedDigraph

@@ -21,8 +21,8 @@ from scipy import sparse
 from ptcc_certify.errors import GraphError, ParameterError, PTCCError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.graphs.tables import ordered_labels
-from ptcc_certify.graphs.weights import Weights
+from ptcc_certify.graphs.labels import ordered_labels
+from ptcc_certify.graphs.packed_weights import Weights
 
 weight = st.one_of(
     st.integers(-(10**20), 10**20),

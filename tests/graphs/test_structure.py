@@ -18,8 +18,8 @@ from hypothesis import strategies as st
 from selection import thinned
 
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.packed_weights import Weights
 from ptcc_certify.graphs.structure import BEHAVIOURS, Structure, WeakComponent, analyse, behaviour_name
-from ptcc_certify.graphs.weights import Weights
 from ptcc_certify.theorems.claims import Claim
 
 Pair = tuple[int, int]

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from lmi.exact.matrix_exponential import LARGEST_NORM, expm
-from lmi.exact.matrix_polynomials import bernstein, nonnegative_between, semidefinite
+from lmi.exact.matrix_polynomial_sign import bernstein, nonnegative_between, semidefinite
 from lmi.exact.work import WorkError, limited
-from ptcc_certify.checker.agent_motion import rest_integral
+from ptcc_certify.checker.common_motion import rest_integral
 
 F = Fraction
 

@@ -21,6 +21,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov import family_search
 from ptcc_certify.lyapunov.aimed_forms import Aim, aimed_functions
+from ptcc_certify.lyapunov.common_left_vector import undirected_function
 from ptcc_certify.lyapunov.family_function import FamilyFunction, decay_matrices, prove_mode
 from ptcc_certify.lyapunov.family_rate_upper_bound import (
     FamilyRateBound,
@@ -31,7 +32,6 @@ from ptcc_certify.lyapunov.family_rate_upper_bound import (
 )
 from ptcc_certify.lyapunov.family_search import search_family
 from ptcc_certify.lyapunov.quotient import Quotient
-from ptcc_certify.lyapunov.undirected_family import undirected_function
 from ptcc_certify.theorems.family_behaviour import decide
 
 TENTH = Fraction(1, 10)

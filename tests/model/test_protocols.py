@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.model import NominalProtocol, Protocol, SlidingModeProtocol
-from ptcc_certify.theorems.symbolic import symbolic_lyapunov, symbolic_sliding
+from ptcc_certify.theorems.casadi_lyapunov import symbolic_lyapunov, symbolic_sliding
 
 SLIDING = SlidingModeProtocol("0.5", 1, "0.1", "0.3", 2, "1.2", "0.6", "0.9", 1)
 PROTOCOL = NominalProtocol("0.6", "0.1", "0.3", 1)

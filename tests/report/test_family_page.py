@@ -35,7 +35,7 @@ from ptcc_certify.report.report_file import write_report
 from ptcc_certify.report.screen import certificate_lines, summary_lines
 from ptcc_certify.report.statement import report_latex
 from ptcc_certify.simulation.run import simulate
-from ptcc_certify.simulation.signals import RandomSignal
+from ptcc_certify.simulation.switching_signals import RandomSignal
 from ptcc_certify.theorems.family_behaviour import decide
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)

@@ -8,16 +8,16 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.model import NominalProtocol
-from ptcc_certify.report.plots.agents import CAMP_STYLES
 from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.input import plot_input
+from ptcc_certify.report.plots.lines_of_agents import CAMP_STYLES
 from ptcc_certify.report.plots.runs import sample_runs
 from ptcc_certify.report.plots.trajectory import plot_trajectory
 from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.simulation.run import simulate
-from ptcc_certify.simulation.signals import RandomSignal, WorstCaseSignal
+from ptcc_certify.simulation.switching_signals import RandomSignal, WorstCaseSignal
 from ptcc_certify.theorems.family_behaviour import decide
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)

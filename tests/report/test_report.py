@@ -52,14 +52,14 @@ from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.io import read_graph
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.report.html_text import LISTED, formula_svg, printable, typeset
 from ptcc_certify.report.latex_text import latex_of_text
-from ptcc_certify.report.notation import LISTED, formula_svg, printable, typeset
 from ptcc_certify.report.page import _environment, report_html
+from ptcc_certify.report.page_states_table import EXTREMES
 from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.report_file import write_report
 from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.report.statement import report_latex
-from ptcc_certify.report.states_table import EXTREMES
 
 #: What a page needs, and nothing that loads, runs or leaves it.
 TAGS = frozenset(

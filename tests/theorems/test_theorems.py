@@ -20,10 +20,10 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.model import NominalProtocol
+from ptcc_certify.theorems.casadi_lyapunov import symbolic_lyapunov
 from ptcc_certify.theorems.claims import sliding_claim
-from ptcc_certify.theorems.composite import _prove_interval
+from ptcc_certify.theorems.leaders_and_followers import _prove_interval
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
-from ptcc_certify.theorems.symbolic import symbolic_lyapunov
 from ptcc_certify.theorems.table import THEOREMS, theorem_for
 
 PROTOCOL = NominalProtocol(T="0.6", rho1="0.1", rho2="0.3", kappa=1)

@@ -21,7 +21,7 @@ from typing import Any
 import flint
 
 from lmi.exact.elementary_enclosures import log
-from ptcc_certify.bounds.agents.motion import Interval
+from ptcc_certify.bounds.agents.common_motion import Interval
 from ptcc_certify.bounds.final_state.of_graph import Influence, influence
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.io import as_graph, as_states

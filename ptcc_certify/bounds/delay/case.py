@@ -14,13 +14,13 @@ from lmi.exact.elementary_enclosures import rounded
 from ptcc_certify.bounds.final_state.of_graph import Influence
 from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above
 from ptcc_certify.checker.late_input import gain_above
-from ptcc_certify.checker.late_messages import PARTS, Messages, Moving
-from ptcc_certify.checker.quadratic_form import Form
+from ptcc_certify.checker.lyapunov_form import Form
+from ptcc_certify.checker.messages_asked import PARTS, Messages, Moving
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.lyapunov.follower_rows import listeners
+from ptcc_certify.lyapunov.late_follower_rows import listeners
 from ptcc_certify.model.base import Protocol
 from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.late_messages import LateMessages

@@ -20,28 +20,28 @@ import numpy as np
 from lmi.errors import LMIError
 from lmi.exact.decimal_rounding import float_up, up
 from ptcc_certify.bounds.delay.case import LateCase
+from ptcc_certify.bounds.delay.certain_misses import Missed, find_missed
 from ptcc_certify.bounds.delay.decay_by_rows import MORE, RowBound, away, search_rows
 from ptcc_certify.bounds.delay.decay_by_steps import Steps, bound_steps, search_steps
 from ptcc_certify.bounds.delay.delay_lmi import DelayLMIBound
-from ptcc_certify.bounds.delay.missed_deadline import Missed, find_missed
-from ptcc_certify.bounds.delay.settling_leaders import Settling
+from ptcc_certify.bounds.delay.followers_of_groups import Settling
 from ptcc_certify.bounds.delay.small_delays import SmallDelays
 from ptcc_certify.bounds.delay.staged_deadlines import stage_deadlines
 from ptcc_certify.bounds.float_conversion import floats, floats_up
 from ptcc_certify.bounds.virtual_positions import VehicleBounds, bound_vehicles, read_vehicles, vehicles_section
 from ptcc_certify.checker.delay_lmi import LateLMIWitness
 from ptcc_certify.checker.late_form import LateFormWitness
-from ptcc_certify.checker.late_messages import Delays, Moving, Packets
-from ptcc_certify.checker.messages import MessagesSection, StepsStart
+from ptcc_certify.checker.late_messages import MessagesSection, StepsStart
+from ptcc_certify.checker.messages_asked import Delays, Moving, Packets
 from ptcc_certify.checker.missed_deadline import Signs
 from ptcc_certify.checker.obligations import CheckReport
-from ptcc_certify.checker.sections import RowVector, declared
+from ptcc_certify.checker.section_declarations import RowVector, declared
 from ptcc_certify.checker.settling_leaders import SettlingWitness
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, pairs_of
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
+from ptcc_certify.lyapunov.late_follower_rows import FollowerRows, RowWitness
 from ptcc_certify.model.base import Protocol
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.limited_gain import LimitedGain

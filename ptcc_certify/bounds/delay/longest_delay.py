@@ -12,8 +12,8 @@ import numpy as np
 
 from ptcc_certify.bounds.delay.case import LateCase
 from ptcc_certify.bounds.delay.delay_lmi import DelayLMIBounds
+from ptcc_certify.bounds.delay.followers_of_groups import SettlingBounds
 from ptcc_certify.bounds.delay.late_messages import LateBounds, bound_late
-from ptcc_certify.bounds.delay.settling_leaders import SettlingBounds
 from ptcc_certify.bounds.delay.small_delays import SmallDelayBounds
 
 #: Halvings of the interval, in powers of two, and digits of the delay that is returned.

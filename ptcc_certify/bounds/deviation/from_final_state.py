@@ -23,7 +23,7 @@ from lmi.exact import arithmetic
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.fast import floats, unit_diagonal
 from ptcc_certify.bounds.final_state.of_graph import Influence
-from ptcc_certify.bounds.input.initial_set import ways
+from ptcc_certify.bounds.input.initial_sets import ways
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import DeviationBound, LyapunovFunction
 from ptcc_certify.theorems.matrix_arithmetic import integer_matrix, integer_rows

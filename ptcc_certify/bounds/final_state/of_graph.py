@@ -33,9 +33,9 @@ from lmi.sparse_h_matrix import SparseHMatrix, solve
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import as_state
+from ptcc_certify.graphs.labels import import_pandas, place_of, position, series
 from ptcc_certify.graphs.rationals import nearest_float, writable
 from ptcc_certify.graphs.structure import ClosedComponent, Structure, analyse
-from ptcc_certify.graphs.tables import import_pandas, place_of, position, series
 from ptcc_certify.theorems.lemmas import (
     EXACT_NODES,
     containment_weights,

@@ -26,7 +26,7 @@ from ptcc_certify.bounds.input.effort import (
     first_input,
 )
 from ptcc_certify.bounds.input.energy import energy_integral
-from ptcc_certify.bounds.input.initial_set import largest_deviation
+from ptcc_certify.bounds.input.initial_sets import largest_deviation
 from ptcc_certify.bounds.input.residual_under_limits import LimitedBounds, bound_disturbed
 from ptcc_certify.bounds.input.tightest_bound import best_bound, least_bound, round_up, usable_functions
 from ptcc_certify.checker import INPUT_NODES

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ptcc_certify.bounds.input.initial_set import read_initial_set
+from ptcc_certify.bounds.input.initial_sets import read_initial_set
 from ptcc_certify.graphs.rationals import nearest_float, whole_number
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.model import Protocol

@@ -8,7 +8,7 @@ from ptcc_certify.graphs.io.conversion import as_family, as_graph
 from ptcc_certify.graphs.io.family_files import read_family
 from ptcc_certify.graphs.io.files import write_atomically
 from ptcc_certify.graphs.io.graph_files import read_graph, write_graph
-from ptcc_certify.graphs.io.initial_state import as_state, as_states, by_label, in_node_order, random_states, read_state
+from ptcc_certify.graphs.io.states import as_state, as_states, by_label, in_node_order, random_states, read_state
 
 __all__ = [
     "as_family",

@@ -11,7 +11,7 @@ import numpy as np
 
 from ptcc_certify.errors import FormatError, GraphError
 from ptcc_certify.graphs.io.columns_beside import column_of
-from ptcc_certify.graphs.io.rows import Beside, Rows, Signs, distinct, rows_of
+from ptcc_certify.graphs.io.raw_edges import Beside, Rows, Signs, distinct, rows_of
 from ptcc_certify.graphs.io.signs import OF_EDGES, is_sign, weight_and_sign
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading

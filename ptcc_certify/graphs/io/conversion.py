@@ -15,15 +15,15 @@ from ptcc_certify.graphs.family import Family, read_share
 from ptcc_certify.graphs.io.columns_beside import column_of, signs_beside_intervals
 from ptcc_certify.graphs.io.family_files import read_family
 from ptcc_certify.graphs.io.graph_files import read_as
+from ptcc_certify.graphs.io.interval_edges import TWICE, Entry, interval_columns, told_weights
 from ptcc_certify.graphs.io.interval_rows import is_family_file
-from ptcc_certify.graphs.io.intervals import TWICE, Entry, interval_columns, told_weights
 from ptcc_certify.graphs.io.packaged import GRAPHS, file_or_packaged
-from ptcc_certify.graphs.io.rows import Beside, Nodes, Rows, Signs, distinct, rows_of
+from ptcc_certify.graphs.io.raw_edges import Beside, Nodes, Rows, Signs, distinct, rows_of
 from ptcc_certify.graphs.io.signs import OF_EDGES, is_sign
 from ptcc_certify.graphs.io.table_columns import BY_HEADER, RATERS, columns_of, edge_columns
+from ptcc_certify.graphs.labels import first_five, labels_beside
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
-from ptcc_certify.graphs.tables import first_five, labels_beside
 
 TAKEN = (
     "a SignedDigraph, a path, the name of a packaged graph, a networkx.DiGraph, an adjacency matrix with orientation=, "

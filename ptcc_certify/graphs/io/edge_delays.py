@@ -11,7 +11,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, pairs_of
 from ptcc_certify.graphs.io.edge_list import records
 from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes
-from ptcc_certify.graphs.io.intervals import interval_columns
+from ptcc_certify.graphs.io.interval_edges import interval_columns
 from ptcc_certify.graphs.io.signs import find
 from ptcc_certify.graphs.io.table_columns import columns_of, edge_columns
 from ptcc_certify.graphs.rationals import parse_exact, shorten

@@ -14,14 +14,14 @@ from ptcc_certify.errors import FormatError, NumberError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io.columns_beside import Column
 from ptcc_certify.graphs.io.files import lines_of
-from ptcc_certify.graphs.io.rows import DECIMALS, HEADER_MEND, Beside, Draft, Numbers, Rows, Signs
+from ptcc_certify.graphs.io.raw_edges import DECIMALS, HEADER_MEND, Beside, Draft, Numbers, Rows, Signs
 from ptcc_certify.graphs.io.signs import WEIGHT, plain, sign_of_word
 from ptcc_certify.graphs.io.table_columns import Columns, columns_of, names_edges
 from ptcc_certify.graphs.io.text_matrices import bracketed_matrix, is_entry, table_as_matrix
+from ptcc_certify.graphs.labels import ordered_labels
 from ptcc_certify.graphs.rationals import parse_exact, shorten
 from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.graphs.size_limits import MAX_LINE
-from ptcc_certify.graphs.tables import ordered_labels
 
 _SEPARATORS = ("\t", ",", ";", None)  # None: blanks
 #: Rows that are looked at before columns are told; different fields after the third that are; where signs are first.

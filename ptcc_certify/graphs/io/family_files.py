@@ -14,8 +14,8 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, Mode, read_share
 from ptcc_certify.graphs.io.files import Source, name_and_ending
 from ptcc_certify.graphs.io.graph_files import MATRICES, read_graph
+from ptcc_certify.graphs.io.interval_edges import may_fail
 from ptcc_certify.graphs.io.interval_rows import read_interval_rows
-from ptcc_certify.graphs.io.intervals import may_fail
 from ptcc_certify.graphs.io.table_columns import BY_HEADER
 from ptcc_certify.graphs.rationals import format_exact, shorten
 from ptcc_certify.graphs.reading import Reading, option_flags

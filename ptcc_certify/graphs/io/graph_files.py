@@ -16,13 +16,13 @@ from ptcc_certify.graphs.io.json_graphs import read_json
 from ptcc_certify.graphs.io.matrix_files import read_mat, read_mtx, read_npy, read_npz
 from ptcc_certify.graphs.io.networkx_formats import read_gexf, read_gml, read_graphml
 from ptcc_certify.graphs.io.pajek import read_pajek
-from ptcc_certify.graphs.io.rows import Rows
+from ptcc_certify.graphs.io.raw_edges import Rows
 from ptcc_certify.graphs.io.sif import read_sif
 from ptcc_certify.graphs.io.table_columns import RATERS
 from ptcc_certify.graphs.io.ucinet import read_dl
-from ptcc_certify.graphs.kinds_of_file import refuse_content_as_graph
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading, option_flags, options_of_record
+from ptcc_certify.graphs.recognised_files import refuse_content_as_graph
 
 MATRICES = {"mtx": read_mtx, "npz": read_npz, "npy": read_npy, "mat": read_mat}
 _GRAPHS = {

@@ -11,14 +11,14 @@ import numpy as np
 
 from ptcc_certify.errors import FormatError, GraphError, NumberError
 from ptcc_certify.graphs.io.columns_beside import directions, is_signed, notes_on_ignored, verdict
-from ptcc_certify.graphs.io.laplacian import Diagonal, diagonal_of, fits_one_node
+from ptcc_certify.graphs.io.laplacian_or_adjacency import Diagonal, diagonal_of, fits_one_node
 from ptcc_certify.graphs.io.problems import Problem, one_message
-from ptcc_certify.graphs.io.rows import DECIMALS, HEADER_MEND, Rows, Signs
+from ptcc_certify.graphs.io.raw_edges import DECIMALS, HEADER_MEND, Rows, Signs
 from ptcc_certify.graphs.io.signs import DIRECTIONS, NO_SIGN, code_among, sign_of_word
+from ptcc_certify.graphs.labels import in_all, ordered_labels
+from ptcc_certify.graphs.packed_weights import LARGEST_WEIGHT, SMALLEST_WEIGHT, Weights
 from ptcc_certify.graphs.rationals import MINUS, as_fraction, nearest_float, parse_exact, shorten
 from ptcc_certify.graphs.reading import Reading
-from ptcc_certify.graphs.tables import in_all, ordered_labels
-from ptcc_certify.graphs.weights import LARGEST_WEIGHT, SMALLEST_WEIGHT, Weights
 
 #: Whole weights from 0 to this, and no other, look like codes.
 _LARGEST_CODE = 9

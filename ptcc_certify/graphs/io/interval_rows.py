@@ -16,13 +16,13 @@ from ptcc_certify.graphs.io.columns_beside import notes_on_ignored, signs_beside
 from ptcc_certify.graphs.io.edge_list import EdgeList, direction_of_comments, records
 from ptcc_certify.graphs.io.files import Source, name_and_ending
 from ptcc_certify.graphs.io.graph_files import format_of, graph_bytes, is_edge_list
-from ptcc_certify.graphs.io.intervals import Entry, Interval, interval_columns, told_weights
+from ptcc_certify.graphs.io.interval_edges import Entry, Interval, interval_columns, told_weights
 from ptcc_certify.graphs.io.problems import Problem, one_message
 from ptcc_certify.graphs.io.signs import is_sign, plain
 from ptcc_certify.graphs.io.table_columns import BY_HEADER, RATERS, Columns, edge_columns
+from ptcc_certify.graphs.labels import in_all
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
-from ptcc_certify.graphs.tables import in_all
 
 #: Options that say nothing about these rows, and why.
 _NOT_TAKEN = {

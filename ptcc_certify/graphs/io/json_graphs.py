@@ -8,7 +8,7 @@ from typing import Any
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io.attributes import attribute_rows, names_or_identifiers
 from ptcc_certify.graphs.io.files import decoded, one_line_errors
-from ptcc_certify.graphs.io.rows import Rows
+from ptcc_certify.graphs.io.raw_edges import Rows
 from ptcc_certify.graphs.io.text_matrices import bracketed_matrix
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading

@@ -18,7 +18,7 @@ import numpy as np
 
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io import files
-from ptcc_certify.graphs.io.rows import Rows, rows_of
+from ptcc_certify.graphs.io.raw_edges import Rows, rows_of
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.graphs.size_limits import MAX_NODES

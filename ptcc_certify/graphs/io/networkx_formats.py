@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io.attributes import attribute_rows, both_ways, lower_case, names_or_identifiers
 from ptcc_certify.graphs.io.files import decoded, lines_of, one_line_errors
-from ptcc_certify.graphs.io.rows import TIMES, Rows
+from ptcc_certify.graphs.io.raw_edges import TIMES, Rows
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
 

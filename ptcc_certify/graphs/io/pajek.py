@@ -11,7 +11,7 @@ from typing import TypeVar
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io.attributes import both_ways
 from ptcc_certify.graphs.io.files import lines_of
-from ptcc_certify.graphs.io.rows import TIMES, Draft, Rows
+from ptcc_certify.graphs.io.raw_edges import TIMES, Draft, Rows
 from ptcc_certify.graphs.io.text_matrices import is_zero
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io.files import lines_of
-from ptcc_certify.graphs.io.rows import Draft, Rows
+from ptcc_certify.graphs.io.raw_edges import Draft, Rows
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
 

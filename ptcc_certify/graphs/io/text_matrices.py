@@ -9,8 +9,8 @@ import numpy as np
 
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io.files import decoded
-from ptcc_certify.graphs.io.laplacian import diagonal_of
-from ptcc_certify.graphs.io.rows import Rows, rows_of
+from ptcc_certify.graphs.io.laplacian_or_adjacency import diagonal_of
+from ptcc_certify.graphs.io.raw_edges import Rows, rows_of
 from ptcc_certify.graphs.io.signs import sign_of_word
 from ptcc_certify.graphs.rationals import shorten
 

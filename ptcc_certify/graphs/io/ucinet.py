@@ -7,7 +7,7 @@ from typing import NoReturn
 
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io.files import lines_of
-from ptcc_certify.graphs.io.rows import Draft, Rows
+from ptcc_certify.graphs.io.raw_edges import Draft, Rows
 from ptcc_certify.graphs.io.text_matrices import matrix_rows
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading

@@ -17,9 +17,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ptcc_certify.bounds.final_state.of_graph import final_state
+from ptcc_certify.certificate.assessment import CERTIFIED, rejects
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certification import certify, certify_case
-from ptcc_certify.certificate.exit_code import CERTIFIED, rejects
 from ptcc_certify.certificate.request import refuse_long_weights
 from ptcc_certify.errors import ParameterError, PTCCError, SimulationError, spell
 from ptcc_certify.examples import load_graph

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.report.figures import PLOTS
+from ptcc_certify.report.page_figures import PLOTS
 from ptcc_certify.report.plots.decay import error_norm, resolved
 from ptcc_certify.report.plots.style import BOUND, RUN, SINGLE_COLUMN, STYLE, figure_bytes, finished, new_axes
 

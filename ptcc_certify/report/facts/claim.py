@@ -10,13 +10,13 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import counted, down, near
 from ptcc_certify.certificate.constrained_switching.claims import LastModeClaim
-from ptcc_certify.certificate.facts import Fact, Facts
+from ptcc_certify.certificate.fact import Fact, Facts
 from ptcc_certify.errors import labelled
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.structure import BIPARTITE_CONTAINMENT, STABILITY, Structure
 from ptcc_certify.report.facts.agents import claimed_of
-from ptcc_certify.report.facts.intervals import interval_text
-from ptcc_certify.report.facts.signals import RESTS, of_mode
+from ptcc_certify.report.facts.constrained_switching import RESTS, of_mode
+from ptcc_certify.report.facts.interval_words import interval_text
 from ptcc_certify.report.text_layout import (
     TEXT,
     agent_text,
@@ -25,11 +25,11 @@ from ptcc_certify.report.text_layout import (
     shorten_list,
     wrap_text,
 )
+from ptcc_certify.theorems.agreeing_groups import AgreeingGroup, FamilyGroups
 from ptcc_certify.theorems.claims import Claim
 from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
 from ptcc_certify.theorems.family_behaviour import CHAIN, DEPENDS, FamilyComponent, decide
-from ptcc_certify.theorems.family_claims import camps, special_behaviours
-from ptcc_certify.theorems.family_groups import AgreeingGroup, FamilyGroups
+from ptcc_certify.theorems.family_special_cases import camps, special_behaviours
 
 if TYPE_CHECKING:
     from ptcc_certify.bounds.final_state.attracting_box import AttractingBox

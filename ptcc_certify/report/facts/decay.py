@@ -13,16 +13,16 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.bounds.envelope import Envelope
-from ptcc_certify.certificate.facts import Fact, Facts, Standing
+from ptcc_certify.certificate.fact import Fact, Facts, Standing
 from ptcc_certify.errors import Change, Sentence, joined, labelled
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
+from ptcc_certify.report.facts.constrained_switching import TINY, TOO_SMALL, every_text
 from ptcc_certify.report.facts.input import limits_text
-from ptcc_certify.report.facts.instants import SHORT, told_instants
-from ptcc_certify.report.facts.signals import TINY, TOO_SMALL, every_text
+from ptcc_certify.report.facts.reported_times import SHORT, told_instants
 from ptcc_certify.report.text_layout import shorten_list
 from ptcc_certify.theorems.counterexample_text import mode_name
-from ptcc_certify.theorems.family_rate import explicit_rate
+from ptcc_certify.theorems.explicit_family_rate import explicit_rate
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate

@@ -8,7 +8,7 @@ from pathlib import PurePath
 import numpy as np
 
 from lmi.exact.decimal_rounding import counted
-from ptcc_certify.certificate.facts import Fact, Facts
+from ptcc_certify.certificate.fact import Fact, Facts
 from ptcc_certify.errors import labelled
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.io.columns_beside import IGNORED

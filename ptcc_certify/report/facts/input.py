@@ -8,9 +8,9 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from lmi.exact.decimal_rounding import down, near, up
-from ptcc_certify.certificate.facts import Fact, Facts, Standing
+from ptcc_certify.certificate.fact import Fact, Facts, Standing
 from ptcc_certify.errors import labelled
-from ptcc_certify.report.facts.signals import every_text
+from ptcc_certify.report.facts.constrained_switching import every_text
 from ptcc_certify.report.text_layout import TEXT, agent_text, shorten_list, value_list
 
 if TYPE_CHECKING:

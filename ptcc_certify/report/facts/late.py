@@ -12,7 +12,7 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import down, float_up, near, up
 from ptcc_certify.bounds.delay.small_delays import delay_threshold
-from ptcc_certify.certificate.facts import Fact, Facts
+from ptcc_certify.certificate.fact import Fact, Facts
 from ptcc_certify.errors import Change, joined, labelled
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure

@@ -7,10 +7,11 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from lmi.exact.decimal_rounding import near
-from ptcc_certify.certificate.exit_code import rejects
-from ptcc_certify.certificate.facts import Fact, Facts
+from ptcc_certify.certificate.assessment import rejects
+from ptcc_certify.certificate.fact import Fact, Facts
 from ptcc_certify.report.facts.agents import agents_facts
 from ptcc_certify.report.facts.claim import assumptions, claim_facts, family_claims
+from ptcc_certify.report.facts.constrained_switching import signal_facts
 from ptcc_certify.report.facts.decay import (
     error_facts,
     family_error_facts,
@@ -21,7 +22,6 @@ from ptcc_certify.report.facts.decay import (
 from ptcc_certify.report.facts.graph import family_facts, graph_facts
 from ptcc_certify.report.facts.input import disturbed_facts, family_input_facts, input_facts
 from ptcc_certify.report.facts.late import late_facts, tracking_facts
-from ptcc_certify.report.facts.signals import signal_facts
 from ptcc_certify.report.facts.sliding import sliding_facts
 from ptcc_certify.report.facts.states import family_final_facts, final_facts, initial_facts
 from ptcc_certify.report.facts.verdict import protocol_facts, run_facts, verdict_facts

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from ptcc_certify.certificate.facts import Fact
+from ptcc_certify.certificate.fact import Fact
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.report.facts.claim import family_claims, structure_claims
 from ptcc_certify.report.facts.graph import family_facts, graph_facts, leader_facts

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from lmi.exact.decimal_rounding import down, up
 from lmi.exact.elementary_enclosures import LARGEST_PUSH
-from ptcc_certify.certificate.facts import Fact, Facts
+from ptcc_certify.certificate.fact import Fact, Facts
 from ptcc_certify.errors import labelled
 from ptcc_certify.report.text_layout import shorten_list, value_list
 

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 from lmi.exact.decimal_rounding import counted, up
 from ptcc_certify.bounds.final_state.of_graph import extremes
-from ptcc_certify.certificate.constrained_switching.states import constant_states, last_states, states_of_signal
-from ptcc_certify.certificate.facts import Fact, Facts
+from ptcc_certify.certificate.constrained_switching.final_states import constant_states, last_states, states_of_signal
+from ptcc_certify.certificate.fact import Fact, Facts
 from ptcc_certify.errors import labelled
 from ptcc_certify.report.facts.claim import assumptions, range_text, told_ranges
-from ptcc_certify.report.facts.intervals import interval_text, intervals_text
-from ptcc_certify.report.facts.signals import agreement_text, every_text, rests
+from ptcc_certify.report.facts.constrained_switching import agreement_text, every_text, rests
+from ptcc_certify.report.facts.interval_words import interval_text, intervals_text
 from ptcc_certify.report.text_layout import (
     TEXT,
     columns,

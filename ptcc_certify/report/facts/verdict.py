@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from lmi.exact.decimal_rounding import near
-from ptcc_certify.certificate.exit_code import CERTIFIED, rejects
-from ptcc_certify.certificate.facts import Fact, Facts
+from ptcc_certify.certificate.assessment import CERTIFIED, rejects
+from ptcc_certify.certificate.fact import Fact, Facts
 from ptcc_certify.errors import Change, Sentence, labelled
 from ptcc_certify.report.facts.input import initial_states_text
 from ptcc_certify.report.text_layout import arithmetic

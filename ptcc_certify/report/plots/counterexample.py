@@ -11,12 +11,12 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.model import NominalProtocol, Protocol
-from ptcc_certify.report.plots.agents import CAMP_STYLES, NAME_SIZE, NAMED_AGENTS, camp_groups, name_agents
 from ptcc_certify.report.plots.graph import plot_graph
+from ptcc_certify.report.plots.lines_of_agents import CAMP_STYLES, NAME_SIZE, NAMED_AGENTS, camp_groups, name_agents
 from ptcc_certify.report.plots.style import axes_of, finished, styled, time_label
 from ptcc_certify.report.text_layout import printable, shorten_text
 from ptcc_certify.simulation.run import simulate
-from ptcc_certify.simulation.signals import TableSignal
+from ptcc_certify.simulation.switching_signals import TableSignal
 from ptcc_certify.theorems.counterexample_text import mode_name
 from ptcc_certify.theorems.family_behaviour import (
     CLOSED_SET,

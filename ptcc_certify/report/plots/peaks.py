@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 
-from ptcc_certify.report.plots.agents import NAME_SIZE
+from ptcc_certify.report.plots.lines_of_agents import NAME_SIZE
 
 #: An input that grows to so many times its initial size, or is above such a share of its largest for less than such a
 #: share of the time, is drawn on a logarithmic axis,

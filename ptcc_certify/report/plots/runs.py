@@ -7,14 +7,20 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.family_comparison import worst_case_signals
+from ptcc_certify.certificate.runs_against_bounds import worst_case_signals
 from ptcc_certify.errors import Change, ParameterError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.model.constrained_switching import ClockShares, DwellTime, JointWindows
 from ptcc_certify.report.plots.style import RUN
 from ptcc_certify.report.plots.subject import certifies_family, trajectory_of
 from ptcc_certify.simulation.run import simulate
-from ptcc_certify.simulation.signals import ConstantSignal, PeriodicSignal, RandomDwellSignal, RandomSignal, Signal
+from ptcc_certify.simulation.switching_signals import (
+    ConstantSignal,
+    PeriodicSignal,
+    RandomDwellSignal,
+    RandomSignal,
+    Signal,
+)
 from ptcc_certify.simulation.trajectory import Trajectory
 
 #: Random signals that are drawn beside the worst cases.

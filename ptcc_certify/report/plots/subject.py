@@ -13,7 +13,7 @@ from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import as_graph
-from ptcc_certify.graphs.kinds_of_file import kind_of
+from ptcc_certify.graphs.recognised_files import kind_of
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.simulation.trajectory import Trajectory
 

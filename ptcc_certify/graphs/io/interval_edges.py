@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 from ptcc_certify.errors import FormatError, GraphError, NumberError, ParameterError
 from ptcc_certify.graphs.family import read_interval
 from ptcc_certify.graphs.io.signs import code_among, find, is_sign, sign_of_word
+from ptcc_certify.graphs.labels import refuse_unnamed
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, shorten
-from ptcc_certify.graphs.tables import refuse_unnamed
 
 _LEAST = ("weight_min", "min_weight", "w_min", "least", "min", "lower")
 _LARGEST = ("weight_max", "max_weight", "w_max", "largest", "max", "upper")

@@ -22,7 +22,7 @@ from ptcc_certify.graphs.rationals import number_within, parse_exact, shorten, w
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS
 from ptcc_certify.model.constrained_switching import DwellTime
 from ptcc_certify.model.gain import Gain
-from ptcc_certify.simulation.members import MIDDLE, Choice, Members
+from ptcc_certify.simulation.member_laplacians import MIDDLE, Choice, Members
 from ptcc_certify.theorems.family_behaviour import decide
 
 if TYPE_CHECKING:

@@ -19,12 +19,12 @@ from ptcc_certify.certificate.evidence import Evidence, Observations
 from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.certificate.request import Expectations, Request
-from ptcc_certify.certificate.section_writer import Writer, finite, readable, text, write
+from ptcc_certify.certificate.section_io import Writer, finite, readable, text, write
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
-from ptcc_certify.checker.late_messages import Delays
 from ptcc_certify.checker.leaders import LeadersAsked
+from ptcc_certify.checker.messages_asked import Delays
 from ptcc_certify.checker.reading import RejectedError, entries, exact, need
-from ptcc_certify.checker.sections import Context, read
+from ptcc_certify.checker.section_declarations import Context, read
 from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.errors import one_line
 from ptcc_certify.graphs.family import Family

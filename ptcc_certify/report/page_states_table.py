@@ -11,12 +11,12 @@ from markupsafe import Markup
 from lmi.exact.decimal_rounding import counted
 from ptcc_certify.bounds.final_state.of_graph import extremes
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.constrained_switching.states import states_of_signal
-from ptcc_certify.report import notation as texts
+from ptcc_certify.certificate.constrained_switching.final_states import states_of_signal
+from ptcc_certify.report import html_text as texts
 from ptcc_certify.report.facts.claim import assumptions
-from ptcc_certify.report.facts.signals import agreement_text, rests
-from ptcc_certify.report.notation import above, below, enclosed, rational
-from ptcc_certify.theorems.family_claims import camps
+from ptcc_certify.report.facts.constrained_switching import agreement_text, rests
+from ptcc_certify.report.html_text import above, below, enclosed, rational
+from ptcc_certify.theorems.family_special_cases import camps
 
 #: Agents up to which each has a row, and how many there are of either extreme above.
 ROWS, EXTREMES = 60, 10

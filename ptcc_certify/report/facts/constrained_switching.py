@@ -14,7 +14,7 @@ from ptcc_certify.certificate.constrained_switching.claims import (
     WindowClaim,
 )
 from ptcc_certify.certificate.constrained_switching.reasons import TOO_SMALL, reasons_for_none
-from ptcc_certify.certificate.facts import Fact, Facts
+from ptcc_certify.certificate.fact import Fact, Facts
 from ptcc_certify.errors import labelled
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, CONSENSUS, CONTAINMENT
@@ -22,7 +22,7 @@ from ptcc_certify.model.constrained_switching import ClockShares, DwellTime, Joi
 from ptcc_certify.report.text_layout import agent_text, printable
 from ptcc_certify.theorems.counterexample_text import mode_name
 from ptcc_certify.theorems.family_behaviour import DEPENDS
-from ptcc_certify.theorems.family_claims import GENERAL
+from ptcc_certify.theorems.family_special_cases import GENERAL
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
@@ -44,7 +44,7 @@ def signal_facts(certificate: Certificate) -> Facts:
     >>> print(next(signal_facts(cert)).text)
     if mode and weights never change: rate 1.58578, as for every signal; nothing more is proved
 
-    Where agents end then is told by :mod:`ptcc_certify.certificate.constrained_switching.states`.
+    Where agents end then is told by :mod:`ptcc_certify.certificate.constrained_switching.final_states`.
     """
     proof = certificate.family_proof
     if proof.signal == "any":

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from ptcc_certify.checker.agent_model import Chains
-from ptcc_certify.checker.agent_motion import motion_of
+from ptcc_certify.checker.common_motion import motion_of
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.model.gain import Gain
 

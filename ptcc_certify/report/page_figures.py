@@ -10,18 +10,18 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from ptcc_certify.bounds.delay.late_messages import LateBounds
+from ptcc_certify.certificate.assessment import REFUTED
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.exit_code import REFUTED
 from ptcc_certify.errors import ParameterError, SimulationError, gated, labelled
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, EXACT_NODES, TRACED_NODES
 from ptcc_certify.model.base import Protocol
-from ptcc_certify.report.notation import set_text
+from ptcc_certify.report.html_text import set_text
 from ptcc_certify.report.plots.agents_motion import plot_formation, plot_motion
 from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.decay import plot_decay
-from ptcc_certify.report.plots.distributions import plot_degrees, plot_final_states
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.input import plot_input
+from ptcc_certify.report.plots.large_graphs import plot_degrees, plot_final_states
 from ptcc_certify.report.plots.spectrum import plot_spectrum
 from ptcc_certify.report.plots.style import figure_bytes
 from ptcc_certify.report.plots.subject import is_of_family
@@ -32,7 +32,7 @@ from ptcc_certify.simulation.late_messages import can_run
 from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.counterexample_text import counterexample_text
 from ptcc_certify.theorems.family_behaviour import DEPENDS, Counterexample, FamilyComponent
-from ptcc_certify.theorems.family_claims import component_holds, component_refutation
+from ptcc_certify.theorems.family_special_cases import component_holds, component_refutation
 
 #: What draws each figure of a certificate, on given axes or its own; all but the graph show its simulated run.
 PLOTS: dict[str, Callable[..., Any]] = {
@@ -65,7 +65,7 @@ def plot(subject: Any, what: str, **keywords: Any) -> Any:
 
     Examples
     --------
-    >>> from ptcc_certify.report.figures import plot
+    >>> from ptcc_certify.report.page_figures import plot
     >>> plot(None, "picture")
     Traceback (most recent call last):
     ptcc_certify.errors.ParameterError: what = 'picture' is unknown; one of decay, input, graph, states, ...

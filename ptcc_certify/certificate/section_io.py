@@ -18,7 +18,7 @@ import numpy as np
 from ptcc_certify.bounds.final_state.enclosed_ends import DECIMALS, RADIUS
 from ptcc_certify.bounds.float_conversion import floats
 from ptcc_certify.checker.reading import Interval, RejectedError
-from ptcc_certify.checker.sections import Pattern, Rule, declared
+from ptcc_certify.checker.section_declarations import Pattern, Rule, declared
 from ptcc_certify.checker.side_files import Numbers, SideFiles, beside
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io.files import read_bytes

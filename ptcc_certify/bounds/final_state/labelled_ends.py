@@ -7,8 +7,8 @@ from fractions import Fraction
 from typing import Any
 
 from lmi.exact.decimal_rounding import down, up
+from ptcc_certify.graphs.labels import place_of
 from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.graphs.tables import place_of
 
 Interval = tuple[Fraction, Fraction]
 

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from ptcc_certify.graphs.family import Family
+from ptcc_certify.theorems.agreeing_groups import FamilyGroups
 from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
-from ptcc_certify.theorems.family_claims import special_behaviours
-from ptcc_certify.theorems.family_groups import FamilyGroups
+from ptcc_certify.theorems.family_special_cases import special_behaviours
 
 
 def decision_document(family: Family, components: Sequence[FamilyComponent]) -> dict[str, Any]:

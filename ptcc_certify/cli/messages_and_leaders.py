@@ -7,7 +7,7 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from ptcc_certify.cli.declared import flag_of, given_of, names_of, options_for
+from ptcc_certify.cli.click_options import flag_of, given_of, names_of, options_for
 from ptcc_certify.cli.options import Options, graph_file
 from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.model.late_messages import LateMessages

@@ -11,8 +11,8 @@ from lmi.exact.matrix_exponential import expm
 from lmi.exact.numbers import integers, longest, shorten
 from lmi.exact.work import spend
 from ptcc_certify.checker.agent_model import Chains
+from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.final_state import FinalState
-from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import Interval, length, need
 from ptcc_certify.checker.side_files import Numbers
 

@@ -25,7 +25,7 @@ from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.family import Component, Family
 from ptcc_certify.checker.reading import Interval, need
-from ptcc_certify.checker.sections import Some
+from ptcc_certify.checker.section_declarations import Some
 
 #: A mean that a signal keeps: weights of agents, or that all are equal up to camps.
 Mean = Literal["equal"] | Some[Fraction]

@@ -10,7 +10,7 @@ from ptcc_certify.bounds.final_state.of_graph import Influence
 from ptcc_certify.checker.input_formulas import InitialSet, Linear
 from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.graphs.io import as_graph, by_label, in_node_order
-from ptcc_certify.graphs.io.initial_state import LARGEST_STATE
+from ptcc_certify.graphs.io.states import LARGEST_STATE
 from ptcc_certify.graphs.rationals import as_fraction, shorten, writable
 from ptcc_certify.graphs.structure import Structure
 

@@ -16,8 +16,8 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.quotient import Quotient
-from ptcc_certify.simulation.members import Members
-from ptcc_certify.simulation.signals import WorstCaseSignal
+from ptcc_certify.simulation.member_laplacians import Members
+from ptcc_certify.simulation.switching_signals import WorstCaseSignal
 from ptcc_certify.simulation.trajectory import Trajectory
 
 #: A bound is exceeded by more than rounding from this ratio on.
@@ -139,7 +139,7 @@ def worst_case_signals(certificate: Certificate, step: float | None = None) -> l
     ----------
     certificate : Certificate
     step : float, optional
-        On the clock, as for :class:`~ptcc_certify.simulation.signals.WorstCaseSignal`.
+        On the clock, as for :class:`~ptcc_certify.simulation.switching_signals.WorstCaseSignal`.
     """
     n = certificate.family_proof.family.n_nodes
     against = [WorstCaseSignal.against(V, quotient, nodes, n, step) for nodes, quotient, V in functions_of(certificate)]

@@ -13,7 +13,7 @@ import click
 
 from ptcc_certify.errors import ParameterError, PTCCError
 from ptcc_certify.gain_design.request import DesignRequest
-from ptcc_certify.graphs.option import Option, options_of
+from ptcc_certify.graphs.declared_option import Option, options_of
 from ptcc_certify.graphs.reading import OPTIONAL, UNCERTAINTY, Reading
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.agents import Agents

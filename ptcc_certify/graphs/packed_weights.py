@@ -9,7 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from ptcc_certify.graphs.equality import ReadOnly
+from ptcc_certify.graphs.array_holders import ReadOnly
 from ptcc_certify.graphs.rationals import format_exact, nearest_float
 
 _INT64_LIMIT = 2**62

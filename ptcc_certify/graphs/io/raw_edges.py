@@ -10,8 +10,8 @@ import numpy as np
 
 from ptcc_certify.errors import GraphError
 from ptcc_certify.graphs.io.columns_beside import Column
+from ptcc_certify.graphs.labels import refuse_unnamed
 from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.graphs.tables import refuse_unnamed
 
 #: What the first row of a table without a header may be.
 HEADER_MEND = "; if this row is a header, name its columns source, target, weight"

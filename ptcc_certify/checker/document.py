@@ -12,7 +12,7 @@ from typing import Any
 from lmi.exact.definite import Arithmetic
 from ptcc_certify.checker.obligations import OBLIGATIONS, VerifiedObligation
 from ptcc_certify.checker.reading import digest, exact, fields, need
-from ptcc_certify.checker.sections import Brings, Context, parts_of, read
+from ptcc_certify.checker.section_declarations import Brings, Context, parts_of, read
 from ptcc_certify.checker.side_files import SideFiles
 
 

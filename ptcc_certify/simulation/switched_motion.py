@@ -14,8 +14,8 @@ import numpy as np
 
 from ptcc_certify.errors import SimulationError
 from ptcc_certify.simulation.cvodes import ON_CLOCK, Motion, Phase
-from ptcc_certify.simulation.members import Choice
-from ptcc_certify.simulation.signals import State, Stretch
+from ptcc_certify.simulation.member_laplacians import Choice
+from ptcc_certify.simulation.switching_signals import State, Stretch
 
 #: Choices of a signal before a run is given up, and those after which it does not go on to see where it settles.
 MOST_STRETCHES, MOST_SETTLING = 100_000, 2_000
@@ -42,7 +42,7 @@ class Course:
     ----------
     motion : Motion
     play : callable
-        As :meth:`Signal.play <ptcc_certify.simulation.signals.Signal.play>`, of the present state alone.
+        As :meth:`Signal.play <ptcc_certify.simulation.switching_signals.Signal.play>`, of the present state alone.
 
     Attributes
     ----------

@@ -19,8 +19,8 @@ from ptcc_certify.graphs.io.conversion import as_graph
 from ptcc_certify.graphs.io.edge_list import records
 from ptcc_certify.graphs.io.files import name_and_ending, read_bytes
 from ptcc_certify.graphs.io.signs import find
+from ptcc_certify.graphs.labels import first_five, labels_beside
 from ptcc_certify.graphs.rationals import MINUS, as_fraction, parse_exact, shorten
-from ptcc_certify.graphs.tables import first_five, labels_beside
 
 _NODE = ("node", "label", "name", "id")
 _VALUE = ("value", "state", "x", "x0", "sigma0")

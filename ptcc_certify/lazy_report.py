@@ -31,7 +31,7 @@ def rendered(by: str, subject: Any, *more: Any, **keywords: Any) -> Any:
 
     Examples
     --------
-    >>> from ptcc_certify.display import rendered
+    >>> from ptcc_certify.lazy_report import rendered
     >>> rendered("plots.style.time_label", "time", "s")
     'time (s)'
     """
