@@ -17,7 +17,7 @@ _MODULES = {
     "matrix_classes": "comparison_matrix irreducible_blocks is_h_matrix is_m_matrix is_z_matrix m_matrix_witness",
     "closed_form": "h_matrix_certificate h_matrix_frontier h_matrix_diagonal "
     "m_matrix_certificate perron_certificate perron_vectors",
-    "joint_block_search": "CoupledCertificate FixedLeader FreeLeader coupled_lyapunov",
+    "leader_follower_search": "CoupledCertificate FixedLeader FreeLeader coupled_lyapunov",
     "diagonal": "diagonal_lyapunov diagonal_rate_limit h_matrix_lyapunov rate_frontier refute_diagonal_lyapunov",
     "full": "FullCertificate full_frontier",
     "schur_coupling": "Coupling RhoInterval couple_blocks schur_positive_definite",

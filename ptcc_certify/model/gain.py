@@ -155,14 +155,27 @@ class Gain(Parameters):
         return self._expressions(t, self._numbers())["gain"]
 
     def capped_expression(self, t: ca.SX, cap: Fraction | None) -> ca.SX:
-        """Return the gain under a cap, if there is one, as a CasADi expression of the symbol ``t``."""
+        """Return the gain under a cap, if there is one, as a CasADi expression of the symbol ``t``.
+
+        Parameters
+        ----------
+        t : casadi.SX
+        cap : Fraction or None
+            The largest gain, in the unit of ``rho1``.
+        """
         import casadi as ca
 
         free = self.expression(t)
         return free if cap is None else ca.fmin(free, float(cap))
 
     def capped_latex(self, cap: Fraction | None) -> str:
-        """Return the LaTeX of the gain under a cap, if there is one, with the parameters as numbers."""
+        """Return the LaTeX of the gain under a cap, if there is one, with the parameters as numbers.
+
+        Parameters
+        ----------
+        cap : Fraction or None
+            The largest gain, in the unit of ``rho1``.
+        """
         free = self.latex()
         return free if cap is None else rf"\min\left({float(cap):g}, {free}\right)"
 
