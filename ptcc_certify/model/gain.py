@@ -160,6 +160,7 @@ class Gain(Parameters):
         Parameters
         ----------
         t : casadi.SX
+            In the unit of ``T``.
         cap : Fraction or None
             The largest gain, in the unit of ``rho1``.
         """
