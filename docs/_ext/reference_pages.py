@@ -21,22 +21,22 @@ ROOMS = {
     ),
     "certificate": (
         "Certificates",
-        "certificate.certificate certificate.exit_code certificate.facts",
+        "certificate.certificate certificate.assessment certificate.fact",
     ),
     "checker": ("The independent check", "certificate.checking checker"),
     "bounds": (
         "Bounds: error, final state, input",
-        "bounds.envelope bounds.sliding_envelope bounds.final_state bounds.input.effort "
-        "bounds.input.initial_set bounds.input.worst_initial_state",
+        "bounds.envelope bounds.sliding_envelope bounds.final_state.of_graph bounds.input.effort "
+        "bounds.input.initial_sets bounds.input.worst_initial_state",
     ),
     "simulation": ("Simulation", "simulation.trajectory"),
     "theorems": (
         "Theorems and lemmas",
-        "theorems.claims theorems.table theorems.theorem theorems.lemmas theorems.symbolic",
+        "theorems.claims theorems.table theorems.theorem theorems.lemmas theorems.casadi_lyapunov",
     ),
     "gain_design": (
         "Design of gains and deadlines",
-        "gain_design.answer gain_design.search gain_design.agents_answer gain_design.agents_search",
+        "gain_design.answer gain_design.search gain_design.agents_answer gain_design.agents_shortest_deadline",
     ),
     "batch": ("Many graphs", "batch"),
     "report": ("Pages, statements, figures", "report.explorer"),

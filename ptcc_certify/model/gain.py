@@ -160,9 +160,9 @@ class Gain(Parameters):
         Parameters
         ----------
         t : casadi.SX
-            In the unit of ``T``.
+            In units of time.
         cap : Fraction or None
-            The largest gain, in the unit of ``rho1``.
+            The largest gain, per unit of time.
         """
         import casadi as ca
 
@@ -175,7 +175,7 @@ class Gain(Parameters):
         Parameters
         ----------
         cap : Fraction or None
-            The largest gain, in the unit of ``rho1``.
+            The largest gain, per unit of time.
         """
         free = self.latex()
         return free if cap is None else rf"\min\left({float(cap):g}, {free}\right)"
