@@ -216,7 +216,7 @@ class Recorded(Evidence):
         ParameterError
             No figure is called so, or there is nothing to draw.
         """
-        return rendered("figures.plot", self, what or self.proof.main_figure, **keywords)
+        return rendered("page_figures.plot", self, what or self.proof.main_figure, **keywords)
 
     # ------------------------------------------------------------------ equality
 

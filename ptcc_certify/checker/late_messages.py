@@ -236,7 +236,7 @@ def _check_steps(
     ways = [clock_below(gain, messages.gain_cap, a, b) for a, b in pairwise(instants)]
     kind, degrees = Steps, [graph.diagonal[v] for v in followers.nodes]
     if doc.exact.numpy and graph.n_edges >= MANY_EDGES:
-        from ptcc_certify.checker.late_steps_arrays import ArraySteps as kind  # noqa: N813
+        from ptcc_certify.checker.array_late_steps import ArraySteps as kind  # noqa: N813
     steps = kind(graph, followers.nodes, degrees, values, error, messages.parts, push)
     bounds = steps.run(instants, messages.delay, ways, gains)
     residual.meet(followers.nodes, (Fraction(steps.largest, scale << FIXED), bounds))

@@ -471,7 +471,7 @@ class Trajectory(ByAgent, ByValue, Shown):
         -------
         matplotlib.axes.Axes
         """
-        return rendered("figures.plot", self, what, **keywords)
+        return rendered("page_figures.plot", self, what, **keywords)
 
     def to_pandas(self, what: str = "states") -> pd.DataFrame:
         """Return the states as a DataFrame: one row per instant, indexed by ``t``, one column per agent.

@@ -24,9 +24,9 @@ from ptcc_certify.certificate.certification import certify
 from ptcc_certify.certificate.json_schema import json_schema
 from ptcc_certify.checker import check, graph
 from ptcc_certify.checker.array_digraph import ArrayDigraph
+from ptcc_certify.checker.array_late_steps import ArraySteps
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.late_steps import Steps, decay_above
-from ptcc_certify.checker.late_steps_arrays import ArraySteps
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol

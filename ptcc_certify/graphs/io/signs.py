@@ -107,7 +107,7 @@ def code_among(values: Sequence[Fraction], title: str) -> Fraction | None:
     Examples
     --------
     >>> code_among([Fraction(1), Fraction(2)], "type"), code_among([Fraction(1), Fraction(-1)], "type")
-    (Fraction(1, 1), None)
+    (Fraction(2, 1), None)
     """
     numbers = set(values)
     if title.strip().lower() == "sign":
