@@ -141,6 +141,9 @@ lambda of L, or measure the own state without delay
                 "add a gain_cap, below (pi/2 - |arg lambda|)/(delay |lambda|) for all nonzero eigenvalues lambda of L, "
                 "or measure the own state without delay"
             )
+        if self.vehicles is not None and not hasattr(self.vehicles, "v0"):
+            what = f"= {shorten(repr(self.vehicles))} are none"
+            raise ParameterError("vehicles", f'{what}; ask for Agents(order=2, exchange="virtual") instead')
         if self.exact and self.vehicles is None:
             raise ParameterError(
                 "messages that are neither late, nor lost, nor rounded; give delay, period or value_error above 0"

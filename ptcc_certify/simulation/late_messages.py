@@ -128,8 +128,12 @@ def simulate_late(
     refuse_no_protocol(protocol)
     if not isinstance(messages, LateMessages):
         raise ParameterError("messages", f"= {shorten(repr(messages))} is none; give LateMessages(delay='0.01'), say")
+    if leaders is not None and not isinstance(leaders, MovingLeaders):
+        raise ParameterError("leaders", f"= {shorten(repr(leaders))} is none; give MovingLeaders(speed=1), say")
     graph = as_graph(graph)
     steps, seed = whole_number(steps, "steps", 2, MOST_STEPS), whole_number(seed, "seed", 0, 2**63)
+    if deadlines is not None and not isinstance(deadlines, Sequence):
+        raise ParameterError("deadlines", f"= {shorten(repr(deadlines))} are none; give one for each agent")
     if deadlines is not None and len(deadlines) != graph.n_nodes:
         raise ParameterError(f"deadlines are {len(deadlines)} for {graph.n_nodes} agents; give one for each")
     first = [float(x) for x in as_state(x0, graph, "x0")]

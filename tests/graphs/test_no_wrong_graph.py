@@ -768,6 +768,27 @@ def test_edges_in_memory_whose_ends_have_no_name_are_refused(end: object):
             ptcc.Family.from_intervals([(end, "b", 1, 2)])
 
 
+def test_all_that_is_wrong_with_the_rows_of_a_graph_is_one_message(tmp_path):
+    path = put(tmp_path, "g.csv", "a,b,x\nc,c,1\na,d,1\na,d,2\nd,a,0\nb,a,y\n")
+    with pytest.raises(FormatError) as refused:
+        read_graph(path)
+    for part in (
+        'line 1: weight "x" of edge a -> b is not a number (2 in all)',
+        "line 2: self-loop",
+        "line 5: weight 0",
+    ):
+        assert part in str(refused.value)
+    assert str(refused.value).endswith("all but line 1 with --drop-self-loops --drop-zeros --duplicates sum|last")
+
+
+def test_intervals_of_networkx_are_read_under_the_titles_that_files_may_have():
+    graph = nx.DiGraph([("a", "b", {"weight": 1, "min": 0, "max": 2}), ("b", "a", {"weight": 1, "min": 1, "max": 1})])
+    assert sorted(ptcc.as_family(graph).modes[0].edge_interval(k) for k in (0, 1)) == [(0, 2), (1, 1)]
+
+
+LATE = ptcc.LateMessages(delay="0.1")
+
+
 @pytest.mark.parametrize(
     "call",
     [
@@ -782,6 +803,9 @@ def test_edges_in_memory_whose_ends_have_no_name_are_refused(end: object):
         lambda _: ptcc.Family.from_intervals(None),
         lambda _: ptcc.Family.from_intervals([("a", "b", 1, 2)], 3),
         lambda _: ptcc.certify("fig1a", ptcc.NominalProtocol(), agents=ptcc.Agents),
+        lambda _: ptcc.LateMessages(delay="0.1", vehicles=3),
+        lambda _: ptcc.simulate_late("fig1a", ptcc.NominalProtocol(), LATE, [1] * 6, leaders=0.5),
+        lambda _: ptcc.simulate_late("fig1a", ptcc.NominalProtocol(), LATE, [1] * 6, deadlines=1),
     ],
 )
 def test_arguments_that_are_none_of_what_is_asked_are_refused(call: Any):

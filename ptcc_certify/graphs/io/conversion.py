@@ -19,7 +19,7 @@ from ptcc_certify.graphs.io.interval_edges import TWICE, Entry, interval_columns
 from ptcc_certify.graphs.io.interval_rows import is_family_file
 from ptcc_certify.graphs.io.packaged import GRAPHS, file_or_packaged
 from ptcc_certify.graphs.io.raw_edges import Beside, Nodes, Rows, Signs, distinct, rows_of
-from ptcc_certify.graphs.io.signs import OF_EDGES, is_sign
+from ptcc_certify.graphs.io.signs import is_sign
 from ptcc_certify.graphs.io.table_columns import BY_HEADER, RATERS, columns_of, edge_columns
 from ptcc_certify.graphs.labels import first_five, labels_beside
 from ptcc_certify.graphs.rationals import shorten
@@ -332,16 +332,17 @@ def _entries_of_table(table: Any) -> list[Entry] | None:
 
 
 def _entries_of_networkx(graph: Any) -> list[Entry] | None:
-    if not any(OF_EDGES & data.keys() for *_, data in graph.edges(data=True)):
+    edges = [data for *_, data in graph.edges(data=True)]
+    titles = list(dict.fromkeys(title for data in edges for title in data if isinstance(title, str)))
+    columns = interval_columns(titles, "the graph")
+    if columns == (None, None, None):
         return None
     refuse_networkx(graph)
-    absent = {"weight": None, "weight_min": None, "weight_max": None, "optional": False}
-    edges = [data for *_, data in graph.edges(data=True)]
-    titles = dict.fromkeys(str(title) for data in edges for title in data if title not in absent)
-    beside = [column_of(title, (data.get(title, "") for data in edges)) for title in titles]
-    if text := signs_beside_intervals(beside, [[data.get(title) for title in [*absent][:3]] for data in edges]):
+    read = ["weight", *(None if k is None else titles[k] for k in columns)]
+    values = lambda title, absent: [absent if title is None else data.get(title, absent) for data in edges]  # noqa: E731
+    told = [values(title, absent) for title, absent in zip(read, (None, None, None, False), strict=True)]
+    beside = [column_of(title, values(title, "")) for title in titles if title not in read]
+    if text := signs_beside_intervals(beside, zip(*told[:3], strict=True)):
         raise GraphError(f"the graph: {text}")
-    return [
-        Entry(f"edge {shorten(str(u))} -> {shorten(str(v))}", u, v, *(data.get(k, absent[k]) for k in absent))
-        for u, v, data in graph.edges(data=True)
-    ]
+    places = [(f"edge {shorten(str(u))} -> {shorten(str(v))}", u, v) for u, v in graph.edges()]
+    return [Entry(*place, *one) for place, one in zip(places, zip(*told, strict=True), strict=True)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Sequence
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any, NoReturn
 
@@ -47,9 +48,10 @@ def edges_of(rows: Rows, name: str, how: Reading) -> Edges:
     if rows.asks and how.orientation is None:
         raise FormatError(f"{name}, {rows.asks}")
     draft = _Draft(rows, name, how)
-    draft.multiply_signs()
-    draft.read_beside()
-    draft.read_laplacian()
+    if not draft.problems:  # otherwise weights are no numbers, and say nothing of signs beside them
+        draft.multiply_signs()
+        draft.read_beside()
+        draft.read_laplacian()
     loops = draft.drop(draft.source == draft.target)
     if not how.drop_self_loops and loops.size:
         draft.tell_self_loops(loops)
@@ -82,6 +84,7 @@ class _Draft:
         self.rows, self.name, self.how = rows, name, how
         self.notes: tuple[str, ...] = ()
         self.problems: list[Problem] = []
+        self.no_weights: dict[int, Problem] = {}  # codes of what is no weight, and why
         self.cancelled, self.undirected = 0, rows.undirected
         self.read_too = set[str]()  # titles of columns beside that turned out to be signs
         first, second = np.asarray(rows.first, dtype=np.int64), np.asarray(rows.second, dtype=np.int64)
@@ -91,6 +94,7 @@ class _Draft:
         self.values: list[Fraction] | np.ndarray
         if not isinstance(rows.weights, np.ndarray):
             self.values = self.read_weights(rows.weights)
+            self.leave_out_no_weights()
         elif rows.weights.dtype.kind == "f":  # a float is the dyadic number that it is
             self.values = rows.weights.astype(np.float64)
             if (odd := np.flatnonzero(~np.isfinite(self.values)[self.codes])).size:
@@ -171,7 +175,7 @@ class _Draft:
             order = sorted(range(len(weights)), key=lambda code: words[code] is not None)
             by_code = {code: self.parsed(weights[code], code) for code in order}  # what is neither is told first
             values = [by_code[code] for code in range(len(weights))]
-        if (title := self.rows.beside.title) and (odd := code_among(values, title)) is not None:
+        if (title := self.rows.beside.title) and not self.no_weights and (odd := code_among(values, title)) is not None:
             what = f'column "{shorten(title)}" holds {odd}: codes of relations, not signs'
             self.refuse(int(np.argmax(self.codes == values.index(odd))), f"{what}; {self.columns_mend()}")
         return values
@@ -194,12 +198,26 @@ class _Draft:
             message, mend = " is outside the range of float64", "rescale the weights"
         except NumberError as error:
             if not isinstance(weight, str):
-                edge = int(np.argmax(self.codes == code))
-                self.refuse(edge, f"edge {self.edge(edge)}: {error}")
+                edge = self.edge(int(np.argmax(self.codes == code)))
+                return self.no_weight(code, *f"edge {edge}: {error}".rsplit("; ", 1))
             message = str(error).removeprefix(quoted) if str(error).startswith(quoted) else f": {error}"
             mend = self.mend_of_text(weight, message, code)
-        edge = int(np.argmax(self.codes == code))
-        return self.refuse(edge, f"weight {quoted} of edge {self.edge(edge)}{message}; {mend}")
+        edge = self.edge(int(np.argmax(self.codes == code)))
+        return self.no_weight(code, f"weight {quoted} of edge {edge}{message}", mend)
+
+    def no_weight(self, code: int, text: str, mend: str = "give a number") -> Fraction:
+        """Note what is no weight, of the first edge that has it."""
+        row = int(self.row[int(np.argmax(self.codes == code))])
+        self.no_weights[code] = Problem(self.rows.where(row), text, mend)
+        return Fraction(1)
+
+    def leave_out_no_weights(self) -> None:
+        """Leave edges without a weight out, and tell of the first of them."""
+        if self.no_weights:
+            without = np.isin(self.codes, [*self.no_weights])
+            first = next(iter(self.no_weights.values()))
+            self.problems.append(replace(first, text=first.text + in_all(int(without.sum()))))
+            self.keep(~without)
 
     def mend_of_text(self, text: str, message: str, code: int) -> str:
         """Tell how a text is mended that is no number."""

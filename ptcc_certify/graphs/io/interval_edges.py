@@ -37,7 +37,7 @@ def interval_columns(first: Sequence[str], place: str) -> tuple[int | None, int 
     """
     low, high, may_fail = (find(first, names, place) for names in (_LEAST, _LARGEST, _OPTIONAL))
     if (low is None) != (high is None):
-        raise FormatError(f"{place}: the header names one end of the intervals; name weight_min and weight_max")
+        raise FormatError(f"{place}: names one end of the intervals; name weight_min and weight_max")
     return low, high, may_fail
 
 

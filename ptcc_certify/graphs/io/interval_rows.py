@@ -241,7 +241,7 @@ def _take(
                 edge = entry.interval(share)
             except GraphError as error:
                 text, _, mend = str(error).partition("; ")
-                broken[mend].append(Problem(place, text, mend.replace("{", "{{").replace("}", "}}")))
+                broken[mend].append(Problem(place, text, mend))
                 continue
             again = pair if pair in seen else pair[::-1]
             if again in seen and (again == pair or how.undirected):

@@ -12,7 +12,7 @@ class Problem:
 
     place: str  # "line 3"; "" where none is told
     text: str
-    mend: str  # {} stands for the option
+    mend: str  # {} stands for the option, if there is one
     option: str = ""
 
 
@@ -32,16 +32,19 @@ def one_message(problems: Sequence[Problem], call: Callable[..., str]) -> tuple[
     >>> one_message([loop], lambda *options: " ".join(options))
     ('line 2', 'self-loop at node a; remove it, or drop all with --drop-self-loops')
     >>> empty = Problem("line 3", "the source is empty", "name a node")
-    >>> one_message([loop, empty], lambda *options: " ".join(options))[1]
-    'line 2: self-loop at node a; line 3: the source is empty; mend these, or all but line 3 with --drop-self-loops'
+    >>> one_message([loop, empty], lambda *options: " ".join(options))[1]  # doctest: +ELLIPSIS
+    'line 2: self-loop at node a; line 3: the source is empty (name a node); mend these, or all but line 3 with ...'
     """
     if len(problems) == 1:
         (one,) = problems
-        return one.place, f"{one.text}; {one.mend.format(call(one.option) if one.option else '')}"
-    texts = "; ".join(f"{one.place}: {one.text}" if one.place else one.text for one in problems)
+        return one.place, f"{one.text}; {one.mend.format(call(one.option)) if one.option else one.mend}"
+    texts = []
+    for one in problems:
+        by_hand = "" if one.option else f" ({one.mend})"
+        texts.append(f"{one.place}: {one.text}{by_hand}" if one.place else f"{one.text}{by_hand}")
+    without = [one.place or "the rest" for one in problems if not one.option]
+    if len(without) == len(problems):
+        return "", f"{'; '.join(texts)}; mend these"
+    how = f"all but {', '.join(without)} with" if without else "read it with"
     options = call(*dict.fromkeys(one.option for one in problems if one.option))
-    if not any(one.option for one in problems):
-        return "", f"{texts}; mend these"
-    by_hand = ", ".join(one.place for one in problems if not one.option)
-    how = f"all but {by_hand} with" if by_hand else "read it with"
-    return "", f"{texts}; mend these, or {how} {options}"
+    return "", f"{'; '.join(texts)}; mend these, or {how} {options}"
