@@ -544,7 +544,8 @@ def read_interval(first: Any, last: Any, place: str) -> tuple[Fraction, Fraction
     try:
         least, largest = as_fraction(first, "the least weight"), as_fraction(last, "the largest weight")
     except NumberError as error:
-        raise GraphError(f"{place}: {error}; give a number") from None
+        mend = "write decimals with a point" if "," in str(error).rpartition('"')[0] else "give a number"
+        raise GraphError(f"{place}: {error}; {mend}") from None
     for end in (least, largest):
         if end and not SMALLEST_WEIGHT <= abs(nearest_float(end)) <= LARGEST_WEIGHT:
             raise GraphError(

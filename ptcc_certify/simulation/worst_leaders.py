@@ -58,8 +58,11 @@ class WorstLeaders:
         self.L_F = L[np.ix_(F, F)]
         self.Q = -np.linalg.solve(self.L_F, L[np.ix_(F, self.heads)])
         self.speed, self.delta = float(leaders.speed), float(leaders.disturbance)
-        self.weights = np.ones(F.size) if u is None else np.asarray(u, dtype=float)
-        if self.weights.shape != (F.size,) or not (self.weights > 0).all():
+        try:
+            self.weights = np.ones(F.size) if u is None else np.asarray(u, dtype=float)
+        except (TypeError, ValueError):
+            self.weights = np.empty(0)  # no numbers
+        if self.weights.shape != (F.size,) or not (np.isfinite(self.weights) & (self.weights > 0)).all():
             raise ParameterError(f"u is not {F.size} positive numbers, one for each follower; leave it out")
 
     def velocities(self, eps: np.ndarray) -> np.ndarray:

@@ -481,6 +481,8 @@ def test_runs_refuse_what_they_cannot_run_by_name() -> None:
         (pair, moving, [1], {}, "x0"),
         (pair, moving, [1, 0], {"steps": 0}, "steps"),
         (pair, moving, [1, 0], {"u": [0]}, "u is not 1 positive numbers"),
+        (pair, moving, [1, 0], {"u": ["x"]}, "u is not 1 positive numbers"),
+        (pair, moving, [1, 0], {"u": [math.inf]}, "u is not 1 positive numbers"),
         (SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1)]), moving, [1, 1], {}, "one group"),
     ):
         with pytest.raises((ParameterError, HypothesisError), match=said):

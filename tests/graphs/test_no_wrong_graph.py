@@ -752,6 +752,33 @@ def test_delays_of_a_column_are_those_of_the_edges_that_were_read(tmp_path):
     }
 
 
+def test_a_row_that_is_dropped_for_its_sign_takes_its_delay_with_it(tmp_path):
+    path = tmp_path / "e.csv"
+    path.write_text("source,target,weight,sign,delay\na,b,1,1,0.01\na,b,3,0,5\nb,a,1,-1,0.02\n")
+    graph = read_graph(path, drop_zeros=True)
+    assert read_delays(path, graph) == {("a", "b"): Fraction(1, 100), ("b", "a"): Fraction(1, 50)}
+
+
+def test_all_that_is_wrong_with_delays_is_one_message(tmp_path):
+    path = tmp_path / "e.csv"
+    path.write_text('source,target,weight,delay\na,b,1,"0,5"\nb,c,1,-1\nc,d,1,-2\nd,e,1,0.1\n')
+    with pytest.raises(FormatError) as told:
+        read_delays(path, read_graph(path))
+    said = str(told.value)
+    assert 'line 2: delay "0,5" of edge a -> b is not a number (write decimals with a point)' in said
+    assert "line 3: delay -1 of edge b -> c is negative (2 in all) (give a number >= 0); mend these" in said
+
+
+def test_decimal_commas_of_intervals_and_ends_without_their_names_are_told(tmp_path):
+    path = tmp_path / "e.csv"
+    path.write_text('source,target,min,max\na,b,"-0,5",1\n')
+    with pytest.raises(GraphError, match='"-0,5" is not a number; write decimals with a point'):
+        read_family(path)
+    path.write_text("node1,node2,weight_min,weight_max\na,b,1,2\n")
+    with pytest.raises(FormatError, match="name the columns of the ends source and target"):
+        read_family(path)
+
+
 def test_nodes_that_are_declared_above_the_header_of_intervals_are_read(tmp_path):
     family = read_family(put(tmp_path, "g.csv", "z\nsource,target,min,max\na,b,1,2\ny\nb,a,1,2\n"))
     assert sorted(family.labels) == ["a", "b", "y", "z"] and family.modes[0].n_edges == 2

@@ -222,8 +222,12 @@ class LateBounds:
         t = np.asarray(t, dtype=float)
         if self.vehicles is not None:  # leaders that have a velocity move, too
             return np.asarray(self.vehicles.over_time(self.case, self.rows, t)[0].max(axis=0))
-        whole = [one.deviation_bound(self.case, t) for one in self.of_all]
-        return np.asarray((np.minimum.reduce(whole) if whole else self.deviation_bound(t)).max(axis=0))
+        least = self.deviation_bound(t).max(axis=0, initial=0)
+        if self.of_all:  # leaders deviate, too
+            leaders = np.setdiff1d(np.arange(len(self.labels)), self.followers)
+            bounds = [one.deviation_bound(self.case, t)[leaders] for one in self.of_all]
+            least = np.maximum(least, np.minimum.reduce(bounds).max(axis=0, initial=0))
+        return np.asarray(least)
 
 
 def bound_late(case: LateCase) -> LateBounds:

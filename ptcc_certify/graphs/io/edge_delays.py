@@ -12,7 +12,8 @@ from ptcc_certify.graphs.family import Family, pairs_of
 from ptcc_certify.graphs.io.edge_list import records
 from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes
 from ptcc_certify.graphs.io.interval_edges import interval_columns
-from ptcc_certify.graphs.io.signs import find
+from ptcc_certify.graphs.io.problems import Problem, first_of, one_message
+from ptcc_certify.graphs.io.signs import find, weight_and_sign
 from ptcc_certify.graphs.io.table_columns import columns_of, edge_columns
 from ptcc_certify.graphs.rationals import parse_exact, shorten
 from ptcc_certify.graphs.reading import Reading
@@ -53,9 +54,10 @@ def read_delays(path: Source, graph: SignedDigraph | Family, title: str = "delay
     place, titles = f"{name}, line {number}", [field.strip() for field in fields]
     how = Reading(columns=graph.read.get("columns"))
     ends = None if how.titles else edge_columns(titles, place)  # of intervals, too
+    sign = None if ends is None else weight_and_sign(titles, place)[1]
     if ends is None:
         told = columns_of(titles, [row for _, row in begin[1:]], place, how)
-        titles, ends = list(told.titles), (told.source, told.target, told.weight)
+        titles, ends, sign = list(told.titles), (told.source, told.target, told.weight), told.sign
     at = find(titles, [title.lower()], place)
     if at is None:
         mend = f"begin with a header source,target,weight,{shorten(title)}"
@@ -63,42 +65,47 @@ def read_delays(path: Source, graph: SignedDigraph | Family, title: str = "delay
             mend = f"add it, or name one of {', '.join(map(shorten, titles))}"
         raise FormatError(f'{place}: no column "{shorten(title)}"; {mend}')
     low, high, _ = interval_columns(titles, place)
-    weights = [column for column in (ends[2] if low is None else low, high) if column is not None]
+    factors = [[column for column in (ends[2] if low is None else low, high) if column is not None]]
+    factors += [] if sign is None else [[sign]]
     dropped = "zeros" in graph.read or bool(graph.read.get("drop_zeros"))  # rows of weight 0
     last = graph.read.get("duplicates") == "last"
     first, second, _ = ends if graph.read.get("orientation") != "listens" else (ends[1], ends[0], None)
     delays: dict[tuple[str, str], Fraction] = {}
-    known: dict[str, Fraction] = {}  # many edges, few delays
+    broken: dict[str, list[Problem]] = {}
+    known: dict[str, Fraction | None] = {}  # many edges, few delays
     for number, row in chain(begin[1:], rows):
         if len([field for field in row if field.strip()]) < 2:
             continue
-        place, text = f"{name}, line {number}", row[at].strip() if at < len(row) else ""
-        source, target = row[first].strip(), row[second].strip()
-        if source == target or (dropped and weights and all(_is_zero(row, column) for column in weights)):
+        source, target, text = (row[k].strip() if k < len(row) else "" for k in (first, second, at))
+        if source == target or (dropped and any(some and all(_is_zero(row, k) for k in some) for some in factors)):
             continue  # it was dropped, and its delay with it
-        try:
-            if text not in known:
-                known[text] = parse_exact(text)
-            value = known[text]
-        except NumberError:
-            edge = f"{shorten(source)} -> {shorten(target)}"
-            raise FormatError(
-                f'{place}: delay "{shorten(text)}" of edge {edge} is not a number; give one >= 0'
-            ) from None
-        if value < 0:
-            edge = f"{shorten(source)} -> {shorten(target)}"
-            raise FormatError(f"{place}: delay {shorten(text)} of edge {edge} is negative; give a number >= 0")
+        if text not in known:
+            known[text] = _number(text)
+        value = known[text]
+        if value is None or value < 0:
+            what, quote = ("negative", "") if value is not None else ("not a number", '"')
+            said = f"delay {quote}{shorten(text)}{quote} of edge {shorten(source)} -> {shorten(target)} is {what}"
+            mend = "write decimals with a point" if value is None and "," in text else "give a number >= 0"
+            broken.setdefault(what, []).append(Problem(f"line {number}", said, mend))
+            continue
         for pair in ((source, target), (target, source))[: 2 if graph.read.get("undirected") else 1]:
             delays[pair] = value if last else max(value, delays.get(pair, value))
+    if broken:
+        where, message = one_message([first_of(some) for some in broken.values()], " ".join)
+        raise FormatError(f"{', '.join(filter(None, (name, where)))}: {message}")
     if dropped:  # sums that are 0, too
         edges = set(pairs_of(graph))
         delays = {pair: delay for pair, delay in delays.items() if pair in edges}
     return delays
 
 
+def _number(text: str) -> Fraction | None:
+    try:
+        return parse_exact(text)
+    except NumberError:
+        return None
+
+
 def _is_zero(row: Sequence[str], column: int) -> bool:
     """Tell whether a field is the number 0; a word for a sign is none."""
-    try:
-        return column < len(row) and parse_exact(row[column].strip()) == 0
-    except NumberError:
-        return False
+    return column < len(row) and _number(row[column].strip()) == 0

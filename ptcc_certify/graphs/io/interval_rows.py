@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import chain
 from typing import NamedTuple
@@ -17,10 +17,9 @@ from ptcc_certify.graphs.io.edge_list import EdgeList, direction_of_comments, re
 from ptcc_certify.graphs.io.files import Source, name_and_ending
 from ptcc_certify.graphs.io.graph_files import format_of, graph_bytes, is_edge_list
 from ptcc_certify.graphs.io.interval_edges import Entry, Interval, interval_columns, told_weights
-from ptcc_certify.graphs.io.problems import Problem, one_message
+from ptcc_certify.graphs.io.problems import Problem, first_of, one_message
 from ptcc_certify.graphs.io.signs import is_sign, plain
 from ptcc_certify.graphs.io.table_columns import BY_HEADER, RATERS, Columns, edge_columns
-from ptcc_certify.graphs.labels import in_all
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
 
@@ -256,8 +255,7 @@ def _take(
     for kind, option in (("loop", how.drop_self_loops), ("zero", how.drop_zeros)):
         if option:
             broken.pop(kind, None)
-    found = [replace(some[0], text=some[0].text + in_all(len(some))) for some in broken.values()]
-    problems += sorted(found, key=lambda problem: int(problem.place.removeprefix("line ")))
+    problems += sorted(map(first_of, broken.values()), key=lambda problem: int(problem.place.removeprefix("line ")))
 
 
 def _text(pair: Sequence[str]) -> str:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+from ptcc_certify.graphs.labels import in_all
 
 
 @dataclass(frozen=True)
@@ -14,6 +16,17 @@ class Problem:
     text: str
     mend: str  # {} stands for the option, if there is one
     option: str = ""
+
+
+def first_of(some: Sequence[Problem]) -> Problem:
+    """Return the first of the problems of one kind, which says how many there are.
+
+    Examples
+    --------
+    >>> first_of([Problem("line 2", "self-loop at a", ""), Problem("line 5", "self-loop at b", "")]).text
+    'self-loop at a (2 in all)'
+    """
+    return replace(some[0], text=some[0].text + in_all(len(some)))
 
 
 def one_message(problems: Sequence[Problem], call: Callable[..., str]) -> tuple[str, str]:

@@ -235,19 +235,19 @@ def _bounds(
     functions = [m for m in envelope.functions if m.coordinates == envelope.coordinates]
     bounds: dict[str, tuple[np.ndarray, dict[str, Any]]] = {}
     label: str | None = "each Lyapunov function"
+    without = f",\n{text}" if (text := ideal_text(certificate)) else ""
     for function in functions if each and len(functions) > 1 else ():
         values = replace(envelope, functions=(function,)).norm_bound(remaining, x0) / unit
         if function.kind == "paper":
             style: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": "--", "zorder": 2.1}
-            style["label"] = f"bound of {certificate.graph_proof.theorems_named}"
+            style["label"] = f"bound of {certificate.graph_proof.theorems_named}{without}"
         else:
             style = {"color": BOUND, "linewidth": 0.6, "alpha": 0.6, "linestyle": "-.", "label": label}
             label = None
         bounds[function.name] = values, style
     best = envelope.norm_bound(remaining, x0) / unit
     label = "proved bound from $x(0)$" if certificate.direct else "bound from $x(0)$ (numerical)"
-    label += f",\n{without}" if (without := ideal_text(certificate)) else ""
-    return bounds | {_BEST: (best, {"color": BOUND, "linewidth": 1.8, "label": label})}
+    return bounds | {_BEST: (best, {"color": BOUND, "linewidth": 1.8, "label": label + without})}
 
 
 def _draw_run(ax: Axes, place: np.ndarray, seen: np.ndarray, floor: float, bottom: float, without: str) -> None:
