@@ -26,7 +26,7 @@ from ptcc_certify.graphs.digraph import (
     Exact,
     SignedDigraph,
 )
-from ptcc_certify.graphs.labels import import_pandas, ordered_labels, refuse_unnamed
+from ptcc_certify.graphs.labels import import_pandas, ordered_labels, refuse_unnamed, refuse_written_twice
 from ptcc_certify.graphs.packed_weights import LARGEST_WEIGHT, SMALLEST_WEIGHT, Weights
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, nearest_float, shorten
 from ptcc_certify.graphs.reading import Reading
@@ -549,10 +549,10 @@ def read_interval(first: Any, last: Any, place: str) -> tuple[Fraction, Fraction
     for end in (least, largest):
         if end and not SMALLEST_WEIGHT <= abs(nearest_float(end)) <= LARGEST_WEIGHT:
             raise GraphError(
-                f"{place}: weight {format_exact(end)} is outside the range of float64; rescale the weights"
+                f"{place}: weight {shorten(format_exact(end))} is outside the range of float64; rescale the weights"
             )
     if least > largest:
-        mend = f"exchange them; a weight from {format_exact(largest)} to {format_exact(least)} has the least first"
+        mend = f"exchange them: a weight from {format_exact(largest)} to {format_exact(least)} has the least first"
         raise GraphError(f"{place}: the least weight {format_exact(least)} is above the largest; {mend}")
     if least == largest == 0:
         raise GraphError(f"{place}: its weight is always 0; leave the edge out")
@@ -589,6 +589,7 @@ def _mode(
     for first, second, *_ in rows:
         known.setdefault(str(first), len(known))
         known.setdefault(str(second), len(known))
+    refuse_written_twice(list(known), "")
     labels, rank = ordered_labels(list(known))
     ends = [rank[np.array([known[str(row[k])] for row in rows], dtype=np.int64)] for k in (0, 1)]
     source, target = ends if orientation == "information" else ends[::-1]

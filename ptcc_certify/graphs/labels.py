@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ptcc_certify.errors import GraphError, ParameterError, UnknownAgentError
+from ptcc_certify.errors import FormatError, GraphError, ParameterError, UnknownAgentError
 from ptcc_certify.graphs.rationals import shorten
 
 if TYPE_CHECKING:
@@ -86,6 +86,23 @@ def refuse_unnamed(node: Any, where: str) -> None:
     """
     if node is None or (str(node) in ("nan", "<NA>", "NaT") and not isinstance(node, str)):
         raise GraphError(f"{where} names no node ({node}); leave it out or name the node")
+
+
+def refuse_written_twice(labels: Sequence[str], place: str) -> None:
+    """Refuse nodes such as 2 and 2.0, which a column of numbers becomes where a field of it is empty.
+
+    Examples
+    --------
+    >>> refuse_written_twice(["1", "2", "2.0"], "a.csv")
+    Traceback (most recent call last):
+    ptcc_certify.errors.FormatError: a.csv: nodes 2 and 2.0 are one number written in two ways; write it in one
+    """
+    there = set(labels)
+    for label in labels:
+        whole, _, zeros = label.partition(".")
+        if zeros and whole in there and not zeros.strip("0") and whole.removeprefix("-").isdecimal():
+            what = f"nodes {shorten(whole)} and {shorten(label)} are one number written in two ways; write it in one"
+            raise FormatError(f"{place}: {what}") if place else GraphError(what)
 
 
 def labels_beside(values: Any) -> list[str] | None:

@@ -391,7 +391,7 @@ def test_all_that_is_wrong_with_rows_of_intervals_is_one_message(folder):
     assert run.code == 2 and run.err.count("\n") == 1
     for part in (
         "line 3: self-loop at node a (2 in all); line 4: edge b -> c: its weight is always 0; line 6: edge b -> c: the",
-        "line 7: the source is empty (name a node or remove the row); line 8: second row for edge a -> b (the first is",
+        "line 7: the source is empty (name the source or remove the row); line 8: second row for edge a -> b (the",
         'line 9: edge b -> d: "x" is not a number',
         "mend these, or all but line 6, line 7, line 8, line 9 with --drop-self-loops --drop-zeros",
     ):

@@ -11,6 +11,7 @@ from typing import Any
 
 import networkx as nx
 import numpy as np
+import pandas as pd
 import pytest
 from bad_inputs import ptcc as run
 from scipy import sparse
@@ -485,6 +486,29 @@ OTHERS = [
         for kind in ("u1", "u2", "u4", "u8")
     ),
     Input("g.npy", npy([[0, 1], [200, 0]], "u1"), "2>1=1 1>2=200"),
+    Input("g.npy", npy([[0, 1], [-3, 0]], "u2"), says=("65533 is what -3 becomes in uint16",)),
+    Input("g.csv", "source,target,weight\n1,2.0,1\n2,3.0,-1\n3,1.0,1\n4,,\n", says=("2 and 2.0 are one number",)),
+    Input("g.csv", "source,target,weight\n1.0,2.0,1\n2.0,1.0,-1\n", "1.0>2.0=1 2.0>1.0=-1"),
+    Input("g.csv", "sep=;\na;b;1\nb;a;-2\n", "a>b=1 b>a=-2"),
+    Input("g.csv", "source,target,weight\na,b,1\n\ufeffb,a,-1\n", "a>b=1 b>a=-1"),
+    Input("g.csv", "# target,source,weight\na,b,1\nb,a,-1\n", says=("a comment names the columns", "--columns")),
+    Input("g.csv", "# source,target,weight\na,b,1\nb,a,-1\n", "a>b=1 b>a=-1"),
+    Input("g.txt", "# FromNodeId\tToNodeId\tSign\n1\t2\t1\n2\t1\t-1\n", "1>2=1 2>1=-1"),
+    Input("g.csv", "Gene1,Gene2,min,max\na,b,-1,2\n", says=("a family of graphs",)),
+    Input("g.csv", "source,target,weight,max\na,b,-1,2\n", "a>b=-1"),
+    Input("m.csv", ";a;b\na;0;0,5\nb;1;0\n", says=("row a, column b of the matrix", "write decimals with a point")),
+    Input("m.csv", ",a,b\na,0,NA\nb,1,0\n", says=("row a, column b of the matrix", '"NA" is not a number')),
+    Input(
+        "g.csv",
+        "source,target,sign,weight\na,b,1\na,,1,2\na,a,1,2\nb,a,1,0\na,c,1,2,3\n",
+        says=(
+            'line 2: edge a -> b has no weight (add one in column "weight")',
+            "line 3: the target",
+            "line 4: self-loop",
+            "line 5: weight 0",
+            "line 6: 5 fields",
+        ),
+    ),
     Input(
         "g.csv", "version https://git-lfs.github.com/spec/v1\noid sha256:1\nsize 9\n", says=("Git LFS", "git lfs pull")
     ),
@@ -777,6 +801,60 @@ def test_decimal_commas_of_intervals_and_ends_without_their_names_are_told(tmp_p
     path.write_text("node1,node2,weight_min,weight_max\na,b,1,2\n")
     with pytest.raises(FormatError, match="name the columns of the ends source and target"):
         read_family(path)
+
+
+def test_comments_that_look_like_rows_and_nodes_without_edges_are_told(tmp_path):
+    rows = "source,target,weight\n# a comment, say, of three\na,b,1\n#a,b,1\nb,#a,-2\nTotal 2020\n"
+    told = "ignored as a comment: #a,b,1", "1 node without edges: Total 2020"
+    assert {*told} <= {*read_graph(put(tmp_path, "g.csv", rows)).read["notes"]}
+    intervals = rows.replace("weight", "min,max").replace(",1", ",1,1").replace("-2", "-2,-1")
+    assert {f"{told[0]},1", told[1]} <= {*read_family(put(tmp_path, "g.csv", intervals)).notes}
+
+
+@pytest.mark.parametrize("word", ["-", "enemy", "distrust", "down"])
+def test_a_sign_in_words_beside_intervals_of_the_other_sign_is_refused(tmp_path, word):
+    for title in ("weight", "value", "rating"):
+        path = put(tmp_path, "g.csv", f"source,target,min,max,{title}\na,b,1,2,+\nb,a,1,2,{word}\n")
+        with pytest.raises(FormatError, match=f'line 3: edge b -> a: "{word}" stands beside 1 to 2; write the sign'):
+            read_family(path)
+    table = pd.DataFrame({"source": ["a"], "target": ["b"], "min": [1], "max": [2], "weight": [word]})
+    with pytest.raises(GraphError, match="stands beside 1 to 2"):
+        ptcc.as_family(table)
+    assert read_family(put(tmp_path, "g.csv", "source,target,min,max,weight\na,b,-2,-1,-\n")).n_nodes == 2
+
+
+def test_rows_of_intervals_that_lost_an_end_or_go_both_ways_are_told(tmp_path):
+    with pytest.raises(FormatError, match="line 3: the target is empty"):
+        read_family(put(tmp_path, "g.csv", "source,target,min,max\na,b,1,2\nb,,,-2\n"))
+    both = put(tmp_path, "g.csv", "source,target,min,max,type\na,b,1,2,Undirected\n")
+    with pytest.raises(FormatError, match="say --undirected of all rows"):
+        read_family(both)
+    assert read_family(both, undirected=True).modes[0].n_edges == 2
+    with pytest.raises(FormatError, match="exchange the ends of these rows"):
+        read_family(put(tmp_path, "g.csv", "source,target,min,max,direction\na,b,1,2,<-\n"))
+    with pytest.raises(FormatError, match="two columns tell whether edges may fail"):
+        read_family(put(tmp_path, "g.csv", "source,target,min,max,optional,may_fail\na,b,1,2,no,yes\n"))
+
+
+def test_what_is_several_graphs_or_no_number_in_memory_is_refused_in_one_line():
+    W = np.array([[0, 1, 0], [0, 0, -1], [1, 0, 0]])
+    with pytest.raises(GraphError, match="a list of graphs is a family"):
+        ptcc.as_graph([W, W], "listens")
+    assert len(ptcc.as_family([W, -W], "listens").modes) == 2
+    for weight in (10**5000, Fraction(1, 10**5000)):
+        with pytest.raises(GraphError, match="outside the range of float64"):
+            ptcc.as_graph([("a", "b", weight)])
+    with pytest.raises(GraphError, match="one number written in two ways"):
+        ptcc.as_graph([(1, 2.0, 1), (2, 1.0, -1)])
+    with pytest.raises(GraphError, match="one number written in two ways"):
+        ptcc.as_family([(1, 2.0, 1, 2), (2, 1.0, -1, 0)])
+
+
+def test_a_node_that_looks_like_a_row_is_written_so_that_it_is_read_back(tmp_path):
+    graph = ptcc.as_graph([("a", "b", 1)])
+    graph = ptcc.SignedDigraph.from_edges(graph.edges, nodes=["north wing 12"])
+    ptcc.write_graph(graph, tmp_path / "g.csv")
+    assert read_graph(tmp_path / "g.csv") == graph
 
 
 def test_nodes_that_are_declared_above_the_header_of_intervals_are_read(tmp_path):

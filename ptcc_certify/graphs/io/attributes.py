@@ -12,7 +12,7 @@ import numpy as np
 from ptcc_certify.errors import FormatError, GraphError
 from ptcc_certify.graphs.io.columns_beside import column_of
 from ptcc_certify.graphs.io.raw_edges import Beside, Rows, Signs, distinct, rows_of
-from ptcc_certify.graphs.io.signs import OF_EDGES, is_sign, weight_and_sign
+from ptcc_certify.graphs.io.signs import family_titles, is_sign, weight_and_sign
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
 
@@ -53,11 +53,11 @@ def values_of_edges(
         An edge has no weight, no sign where others have one, or what makes a family; ``edge(k)`` names the edge k.
     """
     titles = list(dict.fromkeys(title for one in data for title in one))
-    if more := [title for title in titles if title in OF_EDGES]:
-        k = next(k for k, one in enumerate(data) if min(more) in one)
+    if more := family_titles(titles):
+        k = next(k for k, one in enumerate(data) if more[0] in one)
         mend = "as a CSV file with columns source, target, weight_min, weight_max, optional it is read"
         mend = mend if name else "ptcc_certify.as_family takes it"
-        _fail(name, f'edge {edge(k)} has the attribute "{min(more)}", which makes a family of graphs; {mend}')
+        _fail(name, f'edge {edge(k)} has the attribute "{more[0]}", which makes a family of graphs; {mend}')
     at = weight_and_sign(titles, name or "the edges") if told is None else (None, None)
     weight, sign = (None if k is None else titles[k] for k in at)
     if weight is None or sign is None or not any(_has(one, weight) and _has(one, sign) for one in data):

@@ -114,7 +114,7 @@ def verdict(title: str, values: Sequence[str]) -> Verdict:
     return Verdict("", "", signed or bool(negative))
 
 
-def signs_beside_intervals(columns: Iterable[Column], rows: Iterable[Sequence[Any]]) -> str:
+def signs_beside_intervals(columns: Iterable[Column], rows: Iterable[Sequence[Any]], undirected: bool = False) -> str:
     """Return why a column beside uncertain weights is refused: it may hold their signs; "" if none does.
 
     Parameters
@@ -122,6 +122,8 @@ def signs_beside_intervals(columns: Iterable[Column], rows: Iterable[Sequence[An
     columns : iterable of Column
     rows : iterable of sequence
         What is told of the weight of every edge: a weight, or the ends of an interval.
+    undirected : bool
+        Whether all edges go both ways.
 
     Examples
     --------
@@ -135,6 +137,8 @@ def signs_beside_intervals(columns: Iterable[Column], rows: Iterable[Sequence[An
     for column in columns:
         values = [*column.values]
         what = verdict(column.title, values)
+        if what.kind == "directions" and undirected and {*directions(column.title, values)} == {"undirected"}:
+            continue
         held = is_sign(column.title) and next((x for x in values if DIRECTIONS.get(x.lower()) is not False), "")
         if not held and what.kind and (positive or what.kind in ("directions", "turned")):
             held = what.value
@@ -144,6 +148,10 @@ def signs_beside_intervals(columns: Iterable[Column], rows: Iterable[Sequence[An
             held = next((values[k] for k, told in pairs if minus[k] is not None and told == {not minus[k]}), "")
         if held:
             mend = "write signs into the weights or both ends of the intervals, and leave the column out"
+            if what.kind == "directions":
+                mend = "write a row for each direction and leave the column out, or say --undirected of all rows"
+            elif what.kind == "turned":
+                mend = "exchange the ends of these rows, or write both directions, and leave the column out"
             return f'column "{shorten(column.title)}" holds {shorten(held)} beside the weights; {mend}'
     return ""
 

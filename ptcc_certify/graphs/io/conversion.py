@@ -15,11 +15,11 @@ from ptcc_certify.graphs.family import Family, read_share
 from ptcc_certify.graphs.io.columns_beside import column_of, signs_beside_intervals
 from ptcc_certify.graphs.io.family_files import read_family
 from ptcc_certify.graphs.io.graph_files import read_as
-from ptcc_certify.graphs.io.interval_edges import TWICE, Entry, interval_columns, told_weights
+from ptcc_certify.graphs.io.interval_edges import TWICE, Entry, told_weights
 from ptcc_certify.graphs.io.interval_rows import is_family_file
 from ptcc_certify.graphs.io.packaged import GRAPHS, file_or_packaged
 from ptcc_certify.graphs.io.raw_edges import Beside, Nodes, Rows, Signs, distinct, rows_of
-from ptcc_certify.graphs.io.signs import is_sign
+from ptcc_certify.graphs.io.signs import interval_columns, is_sign
 from ptcc_certify.graphs.io.table_columns import BY_HEADER, RATERS, columns_of, edge_columns
 from ptcc_certify.graphs.labels import first_five, labels_beside
 from ptcc_certify.graphs.rationals import shorten
@@ -105,6 +105,8 @@ def as_graph(graph: Any, orientation: str | None = None, **reading: Any) -> Sign
     if isinstance(graph, dict | set | frozenset | bytes | bytearray) or not isinstance(graph, Iterable):
         raise GraphError(f"{shorten(repr(graph))} is not read as a graph; give {TAKEN}")
     rows = list(graph)
+    if _is_list_of_graphs(rows):
+        raise GraphError("a list of graphs is a family, and one graph is asked for; certify and simulate take families")
     if rows and all(isinstance(row, list) and row and all(isinstance(edge, tuple) for edge in row) for row in rows):
         raise GraphError('a list of edge lists is no graph; of a family give a dict, {"day": edges, "night": edges2}')
     if _rows_of_matrix(rows, how.laplacian is not None):
@@ -282,7 +284,10 @@ def _is_list_of_graphs(graphs: Any) -> bool:
     if not isinstance(graphs, list | tuple) or not graphs:
         return False
     return all(
-        isinstance(one, SignedDigraph | Family | str | os.PathLike) or hasattr(one, "is_multigraph") for one in graphs
+        isinstance(one, SignedDigraph | Family | str | os.PathLike)
+        or hasattr(one, "is_multigraph")
+        or getattr(one, "ndim", 0) == 2  # a matrix, or a DataFrame
+        for one in graphs
     )
 
 

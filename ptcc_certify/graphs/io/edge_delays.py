@@ -11,9 +11,8 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, pairs_of
 from ptcc_certify.graphs.io.edge_list import records
 from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes
-from ptcc_certify.graphs.io.interval_edges import interval_columns
-from ptcc_certify.graphs.io.problems import Problem, first_of, one_message
-from ptcc_certify.graphs.io.signs import find, weight_and_sign
+from ptcc_certify.graphs.io.problems import Problem, Problems, one_message
+from ptcc_certify.graphs.io.signs import find, interval_columns, weight_and_sign
 from ptcc_certify.graphs.io.table_columns import columns_of, edge_columns
 from ptcc_certify.graphs.rationals import parse_exact, shorten
 from ptcc_certify.graphs.reading import Reading
@@ -71,7 +70,7 @@ def read_delays(path: Source, graph: SignedDigraph | Family, title: str = "delay
     last = graph.read.get("duplicates") == "last"
     first, second, _ = ends if graph.read.get("orientation") != "listens" else (ends[1], ends[0], None)
     delays: dict[tuple[str, str], Fraction] = {}
-    broken: dict[str, list[Problem]] = {}
+    broken = Problems()
     known: dict[str, Fraction | None] = {}  # many edges, few delays
     for number, row in chain(begin[1:], rows):
         if len([field for field in row if field.strip()]) < 2:
@@ -86,12 +85,16 @@ def read_delays(path: Source, graph: SignedDigraph | Family, title: str = "delay
             what, quote = ("negative", "") if value is not None else ("not a number", '"')
             said = f"delay {quote}{shorten(text)}{quote} of edge {shorten(source)} -> {shorten(target)} is {what}"
             mend = "write decimals with a point" if value is None and "," in text else "give a number >= 0"
-            broken.setdefault(what, []).append(Problem(f"line {number}", said, mend))
+            broken.add(Problem(f"line {number}", said, mend), what)
+            continue
+        if not source or not target:
+            said = f"delay {shorten(text)} of no edge: the {'target' if source else 'source'} is empty"
+            broken.add(Problem(f"line {number}", said, "name both ends or remove it"))
             continue
         for pair in ((source, target), (target, source))[: 2 if graph.read.get("undirected") else 1]:
             delays[pair] = value if last else max(value, delays.get(pair, value))
-    if broken:
-        where, message = one_message([first_of(some) for some in broken.values()], " ".join)
+    if problems := broken.told():
+        where, message = one_message(problems, " ".join)
         raise FormatError(f"{', '.join(filter(None, (name, where)))}: {message}")
     if dropped:  # sums that are 0, too
         edges = set(pairs_of(graph))

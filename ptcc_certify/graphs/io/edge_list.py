@@ -10,15 +10,17 @@ from itertools import chain, islice
 
 import numpy as np
 
+from lmi.exact.decimal_rounding import counted
 from ptcc_certify.errors import FormatError, NumberError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io.columns_beside import Column
 from ptcc_certify.graphs.io.files import lines_of
+from ptcc_certify.graphs.io.problems import Problem, Problems, one_message
 from ptcc_certify.graphs.io.raw_edges import DECIMALS, HEADER_MEND, Beside, Draft, Numbers, Rows, Signs
 from ptcc_certify.graphs.io.signs import WEIGHT, plain, sign_of_word
-from ptcc_certify.graphs.io.table_columns import Columns, columns_of, names_edges
+from ptcc_certify.graphs.io.table_columns import Columns, columns_of, edge_columns, names_edges
 from ptcc_certify.graphs.io.text_matrices import bracketed_matrix, is_entry, table_as_matrix
-from ptcc_certify.graphs.labels import ordered_labels
+from ptcc_certify.graphs.labels import first_five, ordered_labels
 from ptcc_certify.graphs.rationals import parse_exact, shorten
 from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.graphs.size_limits import MAX_LINE
@@ -41,6 +43,9 @@ def records(data: bytes, name: str) -> Iterator[tuple[int, list[str]]]:
     separator: str | None = ","
     detected = False
     for number, line in numbered:
+        if number == 1 and (told := re.fullmatch(r'"?sep=([,;\t ])"?\s*', line)):  # as Excel tells it
+            separator, detected = told[1].strip(" ") or None, True
+            continue
         if line.lstrip()[:1] in "#%":  # the empty text is in every text
             continue
         try:
@@ -117,10 +122,31 @@ def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
     draft = EdgeList(name, columns, started)
     draft.read(chain(begin, numbered))
     rows = draft.rows()
+    rows.notes += notes_on_comments(data)
+    if rows.problems and not columns.titles:  # of which the other rules say nothing
+        place, message = one_message(rows.problems, " ".join)
+        raise FormatError(f"{', '.join(filter(None, (name, place)))}: {message}")
     if not columns.titles and not columns.told:
+        _refuse_titles_of_comments(data, name)
         _refuse_ambiguous(draft, rows, data, konect)
     rows.undirected = undirected
     return rows
+
+
+def notes_on_comments(data: bytes) -> tuple[str, ...]:
+    r"""Note comments below the first row that look like rows of edges, which a label that begins with # makes of one.
+
+    Examples
+    --------
+    >>> notes_on_comments(b"a,b,1\n#b,a,2\n")
+    ('ignored as a comment: #b,a,2',)
+    """
+    first = re.search(rb"^[^#%\s].*$", data, re.MULTILINE)
+    lines = re.findall(rb"^[#%][^\s#%,;].*[,;\t].*[,;\t].*$", data[first.end() :], re.MULTILINE) if first else []
+    if not lines:
+        return ()
+    rest = f" and {len(lines) - 1} more" if len(lines) > 1 else ""
+    return (f"ignored as a comment: {shorten(lines[0].decode('utf-8', 'replace').strip())}{rest}",)
 
 
 def direction_of_comments(data: bytes, name: str) -> str:
@@ -147,6 +173,8 @@ class EdgeList(Draft):
         self.signs, self.sign_codes = Numbers(), list[int]()
         self.beside = [(k, Column(columns.titles[k])) for k in columns.ignored]
         self.kept: list[list[str]] | None = None  # the fields of every edge, where they are asked for
+        self.broken = Problems()
+        self.ends: tuple[int | None, ...] = (columns.source, columns.target, columns.weight)  # and what tells weights
         self.extra: dict[str, int] = {}  # fields after the third of a table without header, and the line of each
 
     def read(self, rows: Iterable[tuple[int, list[str]]]) -> None:
@@ -156,8 +184,8 @@ class EdgeList(Draft):
         s, t, w, sign = columns.source, columns.target, columns.weight, columns.sign
         width = len(columns.titles) or (10**9 if columns.told else 3)
         for number, row in rows:
-            if len(row) > width and any(map(str.strip, row[width:])):
-                self.more_fields(number, row, width)
+            if len(row) > width and any(map(str.strip, row[width:])) and self.more_fields(number, row, width):
+                continue
             try:
                 source, target, code = nodes[row[s]], nodes[row[t]], weights[row[w]]
                 if sign is not None:
@@ -174,34 +202,55 @@ class EdgeList(Draft):
             for k, column in self.beside:
                 column.add(row[k] if k < len(row) else "")
 
-    def more_fields(self, number: int, row: list[str], width: int) -> None:
-        """Refuse fields beyond a header; keep those after the third of a table without."""
+    def more_fields(self, number: int, row: list[str], width: int) -> bool:
+        """Note fields beyond a header, which make a row none; keep those after the third of a table without."""
         if self.columns.titles:
-            what = f"{len(row)} fields, and the header has {width}; quote fields that hold the separator"
-            what += ", or write the table of R with row.names = FALSE" if len(row) == width + 1 else ""
-            raise FormatError(f"{self.name}, line {number}: {what}")
+            mend = "quote fields that hold the separator"
+            mend += ", or write the table of R with row.names = FALSE" if len(row) == width + 1 else ""
+            self.broken.add(Problem(f"line {number}", f"{len(row)} fields, and the header has {width}", mend), "fields")
+            return True
         if len(self.extra) < _EXTRA:
             for field in row[width:]:
                 self.extra.setdefault(field.strip(), number)
+        return False
 
     def no_edge(self, number: int, row: list[str]) -> None:
-        """Declare the node of a row without an edge, or refuse the row."""
-        columns, place = self.columns, f"{self.name}, line {number}"
-        ends = (columns.source, columns.target, columns.weight)
-        if columns.sign is not None and all(k < len(row) and row[k] for k in ends):
-            title = shorten(columns.titles[columns.sign])
-            raise FormatError(
-                f'{place}: edge {shorten(row[ends[0]])} -> {shorten(row[ends[1]])} has no "{title}"; add one'
-            )
-        mend = HEADER_MEND if number == self.started else ""
-        if label := _declared(row, ends, place, mend):
-            _ = self.nodes[label]
+        """Declare the node of a row without an edge, or note what is wrong with the row."""
+        columns, titles = self.columns, self.columns.titles
+        if len(row) < 2 or not any(row):
+            if label := "".join(row):
+                _ = self.nodes[label]
+            return
+        field = lambda k: row[k] if k is not None and k < len(row) else ""  # noqa: E731
+        source, target, *weights = map(field, self.ends)
+        edge = f"edge {shorten(source)} -> {shorten(target)}"
+        if source and target and columns.sign is not None and all(weights):
+            title = shorten(titles[columns.sign])
+            problem = Problem(f"line {number}", f'{edge} has no "{title}"', "add one")
+        elif source and target:
+            lacking = next(k for k in self.ends[2:] if k is not None and not field(k))
+            mend = f'add one in column "{shorten(titles[lacking])}"' if titles else "add one in a third column"
+            mend += HEADER_MEND if number == self.started else ""
+            problem = Problem(f"line {number}", f"{edge} has no weight", mend)
+        elif target or not source or any(weights):
+            end = "target" if source else "source"
+            problem = Problem(f"line {number}", f"the {end} is empty", f"name the {end} or remove the row")
+        else:
+            _ = self.nodes[source]
+            return
+        self.broken.add(problem, "no weight" if problem.text.endswith("has no weight") else "")
+
+    def nodes_alone(self) -> tuple[str, ...]:
+        """Note nodes without edges, which rows of one field declare."""
+        there = {*self.first, *self.second}
+        alone = [label for k, label in enumerate(self.nodes.texts) if k not in there]
+        return (f"{counted(len(alone), 'node')} without edges: {first_five(alone)}",) if alone else ()
 
     def rows(self) -> Rows:
         """Return what was read; refuse titles that are nodes, too."""
         columns, rows = self.columns, super().rows()
-        rows.headerless = not columns.titles
-        rows.notes, rows.asks = columns.notes, columns.asks
+        rows.headerless, rows.problems = not columns.titles, self.broken.told()
+        rows.notes, rows.asks = (*columns.notes, *self.nodes_alone()), columns.asks
         rows.notes += ("columns ignored: after the third",) if self.extra else ()
         rows.beside = Beside(columns.codes, None, [column for _, column in self.beside], columns.told)
         if columns.sign is not None:
@@ -221,6 +270,17 @@ def _refuse_titles(row: list[str], place: str, data: bytes) -> None:
         if re.search(rb"[;\t]\s*[+-]?\d+,\d+\s*$", data, re.MULTILINE):
             mend += DECIMALS
         raise FormatError(f"{place}: the header {titles} names no source and target; {mend}")
+
+
+def _refuse_titles_of_comments(data: bytes, name: str) -> None:
+    """Refuse rows without a header whose columns a comment names in another order, as numpy.savetxt writes it."""
+    for line in data[:2000].decode("utf-8", "replace").removeprefix("\ufeff").splitlines():
+        if line.strip()[:1] not in "#%":
+            break
+        titles = re.split(r"\s*[,;\t ]\s*", line.strip(" \t#%"))
+        if (ends := edge_columns(titles, name)) is not None and ends[:2] != (0, 1):
+            mend = f"remove {line.strip()[0]} before {shorten(titles[0])}, or tell them: --columns 1,2,3"
+            raise FormatError(f"{name}: a comment names the columns; {mend}")
 
 
 def _refuse_ambiguous(draft: EdgeList, rows: Rows, data: bytes, konect: bool) -> None:
@@ -292,19 +352,6 @@ def _refuse_decimal_commas(data: bytes, name: str) -> None:
         )
 
 
-def _declared(row: list[str], columns: tuple[int, int, int], place: str, mend: str) -> str:
-    """Return the node that a row without an edge declares, "" if the row is empty; refuse any other."""
-    if len(row) < 2 or not any(row):
-        return "".join(row)
-    source, target, weight = (row[i] if i < len(row) else "" for i in columns)
-    if source and target:
-        edge = f"{shorten(source)} -> {shorten(target)}"
-        raise FormatError(f"{place}: edge {edge} has no weight; add one in a third column{mend}")
-    if target or weight or not source:
-        raise FormatError(f"{place}: the {'target' if source else 'source'} is empty; name a node or remove the row")
-    return source
-
-
 def edge_list(graph: SignedDigraph, name: str) -> bytes:
     """Write a graph as an edge list that is read back as an equal graph with the same order of nodes."""
     labels = [_cell(label, name) for label in graph.labels]
@@ -324,6 +371,6 @@ def _cell(label: str, name: str) -> str:
     if odd or len(label) > MAX_LINE // 5:
         what = f"is empty, not Unicode text, has blanks around it or is longer than {MAX_LINE // 5} characters"
         raise FormatError(f'{name}: label "{shorten(label)}" {what}; rename the node')
-    if label[0] in "#%" or re.search(r'[,;"\t\n\r]', label):
+    if label[0] in "#%" or re.search(r'[,;"\t\n\r]', label) or _other_separator(label):
         return '"' + label.replace('"', '""') + '"'
     return label

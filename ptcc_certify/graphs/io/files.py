@@ -95,7 +95,7 @@ def decoded(data: bytes, name: str) -> str:
 
 def lines_of(data: bytes, name: str) -> list[str]:
     r"""Decode UTF-8 and split at ``\n`` (at ``\r`` in files without ``\n``); a ``\r`` before ``\n`` stays."""
-    text = decoded(data, name)
+    text = decoded(data, name).replace("\n\ufeff", "\n")  # of files that were put one behind the other
     lines = text.split("\n") if "\n" in text else text.split("\r")
     if len(longest := max(lines, key=len)) > MAX_LINE:
         place, mend = f"{name}, line {lines.index(longest) + 1}", "break it, or name the format of the file"

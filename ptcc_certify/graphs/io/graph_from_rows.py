@@ -16,11 +16,15 @@ from ptcc_certify.graphs.io.laplacian_or_adjacency import Diagonal, diagonal_of,
 from ptcc_certify.graphs.io.problems import Problem, one_message
 from ptcc_certify.graphs.io.raw_edges import DECIMALS, HEADER_MEND, Rows, Signs
 from ptcc_certify.graphs.io.signs import DIRECTIONS, NO_SIGN, code_among, sign_of_word
-from ptcc_certify.graphs.labels import in_all, ordered_labels
+from ptcc_certify.graphs.labels import in_all, ordered_labels, refuse_written_twice
 from ptcc_certify.graphs.packed_weights import LARGEST_WEIGHT, SMALLEST_WEIGHT, Weights
 from ptcc_certify.graphs.rationals import MINUS, as_fraction, nearest_float, parse_exact, shorten
 from ptcc_certify.graphs.reading import Reading
 
+#: Numbers of a type without signs that are nearer to its largest than this were negative.
+_WRAPPED = 32
+#: Bits of fractions that are not written.
+_LONG = 4000
 #: Whole weights from 0 to this, and no other, look like codes.
 _LARGEST_CODE = 9
 
@@ -40,15 +44,16 @@ def edges_of(rows: Rows, name: str, how: Reading) -> Edges:
         Of the file; "" of data in memory, where mends are parameters instead of flags.
     how : Reading
     """
-    if name and not rows.labels:
+    if name and not rows.labels and not rows.problems:
         raise FormatError(f"{name}: no edge and no node in this file; give rows source,target,weight")
     if name and len(set(rows.labels)) < len(rows.labels):
         label = Counter(rows.labels).most_common(1)[0][0]
         raise FormatError(f'{name}: two nodes have the label "{shorten(label)}"; rename one')
+    refuse_written_twice(rows.labels, name)
     if rows.asks and how.orientation is None:
         raise FormatError(f"{name}, {rows.asks}")
     draft = _Draft(rows, name, how)
-    if not draft.problems:  # otherwise weights are no numbers, and say nothing of signs beside them
+    if not draft.no_weights:  # otherwise weights are no numbers, and say nothing of signs beside them
         draft.multiply_signs()
         draft.read_beside()
         draft.read_laplacian()
@@ -83,7 +88,7 @@ class _Draft:
     def __init__(self, rows: Rows, name: str, how: Reading):
         self.rows, self.name, self.how = rows, name, how
         self.notes: tuple[str, ...] = ()
-        self.problems: list[Problem] = []
+        self.problems: list[Problem] = [*rows.problems]
         self.no_weights: dict[int, Problem] = {}  # codes of what is no weight, and why
         self.cancelled, self.undirected = 0, rows.undirected
         self.read_too = set[str]()  # titles of columns beside that turned out to be signs
@@ -102,8 +107,9 @@ class _Draft:
                 self.refuse(odd[0], f"{weight} is not a finite number; remove the entry or give a weight")
         else:
             self.values = [Fraction(value) for value in rows.weights.tolist()]
-            if rows.weights.dtype.kind == "u" and (wrapped := np.iinfo(rows.weights.dtype).max) in self.values:
-                what = f"{wrapped} is what -1 becomes in {rows.weights.dtype}"
+            most = max(rows.weights.tolist(), default=0)
+            if rows.weights.dtype.kind == "u" and most > (top := np.iinfo(rows.weights.dtype).max) - _WRAPPED:
+                what = f"{most} is what {most - top - 1} becomes in {rows.weights.dtype}"
                 self.fail(name, f"{what}; store the matrix as int64 or float64")
 
     def keep(self, which: np.ndarray) -> None:
@@ -188,22 +194,23 @@ class _Draft:
 
     def parsed(self, weight: Any, code: int) -> Fraction:
         """Read a weight exactly, or name the first edge that has it."""
-        quoted = f'"{shorten(str(weight))}"'
+        edge = lambda: self.edge(int(np.argmax(self.codes == code)))  # noqa: E731
+        quoted = f'"{shorten(weight)}"' if isinstance(weight, str) else "a number"
         try:
-            if isinstance(weight, Fraction):
+            if isinstance(weight, Fraction) and max(map(int.bit_length, weight.as_integer_ratio())) < _LONG:
                 return weight  # the graph itself refuses one that no float64 is near
             value = parse_exact(weight) if isinstance(weight, str) else as_fraction(weight, "weight")
             if not value or SMALLEST_WEIGHT <= abs(nearest_float(value)) <= LARGEST_WEIGHT:
                 return value
-            message, mend = " is outside the range of float64", "rescale the weights"
+            return self.no_weight(
+                code, f"weight {quoted} of edge {edge()} is outside the range of float64", "rescale the weights"
+            )
         except NumberError as error:
             if not isinstance(weight, str):
-                edge = self.edge(int(np.argmax(self.codes == code)))
-                return self.no_weight(code, *f"edge {edge}: {error}".rsplit("; ", 1))
+                return self.no_weight(code, *f"edge {edge()}: {error}".rsplit("; ", 1))
             message = str(error).removeprefix(quoted) if str(error).startswith(quoted) else f": {error}"
             mend = self.mend_of_text(weight, message, code)
-        edge = self.edge(int(np.argmax(self.codes == code)))
-        return self.no_weight(code, f"weight {quoted} of edge {edge}{message}", mend)
+            return self.no_weight(code, f"weight {quoted} of edge {edge()}{message}", mend)
 
     def no_weight(self, code: int, text: str, mend: str = "give a number") -> Fraction:
         """Note what is no weight, of the first edge that has it."""

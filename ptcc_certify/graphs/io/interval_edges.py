@@ -2,43 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from fractions import Fraction
 from typing import Any, NamedTuple
 
-from ptcc_certify.errors import FormatError, GraphError, NumberError, ParameterError
+from ptcc_certify.errors import GraphError, NumberError, ParameterError
 from ptcc_certify.graphs.family import read_interval
-from ptcc_certify.graphs.io.signs import code_among, find, is_sign, sign_of_word
+from ptcc_certify.graphs.io.signs import code_among, is_sign, sign_of_word
 from ptcc_certify.graphs.labels import refuse_unnamed
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, shorten
 
-_LEAST = ("weight_min", "min_weight", "w_min", "least", "min", "lower")
-_LARGEST = ("weight_max", "max_weight", "w_max", "largest", "max", "upper")
-_OPTIONAL = ("optional", "may_fail")
 _YES, _NO = ("yes", "true", "1", "x"), ("no", "false", "0", "")
 #: Of weights in intervals.
 TWICE = "the edges give intervals themselves; leave out the uncertainty"
 
 Interval = tuple[Any, Any, Fraction, Fraction]
-
-
-def interval_columns(first: Sequence[str], place: str) -> tuple[int | None, int | None, int | None]:
-    """Return the columns of the least and the largest weight, and that of edges that may fail; None of each it lacks.
-
-    Raises
-    ------
-    FormatError
-        One end of the intervals is named without the other.
-
-    Examples
-    --------
-    >>> interval_columns(["source", "target", "weight_min", "weight_max"], "a.csv")
-    (2, 3, None)
-    """
-    low, high, may_fail = (find(first, names, place) for names in (_LEAST, _LARGEST, _OPTIONAL))
-    if (low is None) != (high is None):
-        raise FormatError(f"{place}: names one end of the intervals; name weight_min and weight_max")
-    return low, high, may_fail
 
 
 class Entry(NamedTuple):
@@ -64,7 +42,7 @@ class Entry(NamedTuple):
         told = [end for end in (self.weight, self.least, self.largest) if end is not None and str(end).strip()]
         try:
             return bool(told) and not any(as_fraction(end, "weight") for end in told)
-        except (NumberError, TypeError):
+        except (NumberError, TypeError, ValueError):
             return False
 
     def interval(self, share: Fraction) -> Interval:
@@ -82,7 +60,7 @@ class Entry(NamedTuple):
         """
         for end, node in (("source", self.source), ("target", self.target)):
             if isinstance(node, str) and not node.strip():
-                raise GraphError(f"{self.place}: the {end} is empty; name a node or remove the row")
+                raise GraphError(f"{self.place}: the {end} is empty; name the {end} or remove the row")
             refuse_unnamed(node, self.place)
         single = self.least is None and self.largest is None
         if not single and share:
@@ -140,10 +118,14 @@ def told_weights(weights: Iterable[Any], title: str) -> list[Any]:
 
 
 def _refuse_outside(weight: object, least: Fraction, largest: Fraction, place: str) -> None:
-    """Refuse a weight that stands beside an interval and lies outside of it; what is no number says nothing."""
+    """Refuse a weight, or a sign, that stands beside an interval and lies outside of it; other texts say nothing."""
     try:
         number = as_fraction(weight, "weight")  # type: ignore[arg-type]
-    except (NumberError, TypeError):
+    except (NumberError, TypeError, ValueError):
+        sign = sign_of_word(weight) if isinstance(weight, str) else None
+        if sign is not None and (least if sign > 0 else -largest) < 0:
+            what = f'"{shorten(str(weight))}" stands beside {format_exact(least)} to {format_exact(largest)}'
+            raise GraphError(f"{place}: {what}; write the sign into both ends") from None
         return
     if not least <= number <= largest:
         ends = f"{format_exact(least)} to {format_exact(largest)}"

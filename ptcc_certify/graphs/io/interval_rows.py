@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import chain
@@ -13,13 +11,14 @@ from typing import NamedTuple
 from lmi.exact.decimal_rounding import counted
 from ptcc_certify.errors import FormatError, GraphError, ParameterError
 from ptcc_certify.graphs.io.columns_beside import notes_on_ignored, signs_beside_intervals
-from ptcc_certify.graphs.io.edge_list import EdgeList, direction_of_comments, records
+from ptcc_certify.graphs.io.edge_list import EdgeList, direction_of_comments, notes_on_comments, records
 from ptcc_certify.graphs.io.files import Source, name_and_ending
 from ptcc_certify.graphs.io.graph_files import format_of, graph_bytes, is_edge_list
-from ptcc_certify.graphs.io.interval_edges import Entry, Interval, interval_columns, told_weights
-from ptcc_certify.graphs.io.problems import Problem, first_of, one_message
-from ptcc_certify.graphs.io.signs import is_sign, plain
+from ptcc_certify.graphs.io.interval_edges import Entry, Interval, told_weights
+from ptcc_certify.graphs.io.problems import Problem, Problems, one_message
+from ptcc_certify.graphs.io.signs import interval_columns, is_sign, plain
 from ptcc_certify.graphs.io.table_columns import BY_HEADER, RATERS, Columns, edge_columns
+from ptcc_certify.graphs.labels import refuse_written_twice
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
 
@@ -130,24 +129,27 @@ def read_interval_rows(path: Source, how: Reading, share: Fraction) -> IntervalR
         raise FormatError(
             f"{table.name}: gives intervals itself; leave out the uncertainty, or write those of all files"
         )
-    problems = _of_the_header(table, how)
+    header = _of_the_header(table, how)
     edges = _Edges(table)
     edges.read(table.rows)
-    if not edges.nodes and not edges.problems:
+    if not edges.nodes and not edges.broken.told():
         raise FormatError(f"{table.name}: no edge and no node below the header; give rows")
+    refuse_written_twice([*edges.nodes.texts], table.name)
     rows = IntervalRows([*edges.nodes.texts], notes=(BY_HEADER,) if table.ends[0] > 0 else ())
     rows.notes += (RATERS,) if plain(table.header[table.ends[0]]) == "rater" and how.orientation is None else ()
     beside = [column for _, column in edges.beside]
     try:
         entries = edges.entries(how)
-        text = signs_beside_intervals(beside, [entry[3:6] for _, entry in entries])
+        text = signs_beside_intervals(beside, [entry[3:6] for _, entry in entries], how.undirected)
     except GraphError as error:
         text = str(error)
     if text:
         raise FormatError(f"{table.name}: {text}")
-    rows.notes += notes_on_ignored(beside)
-    _take(rows, entries, how, share, problems, edges.problems)
-    if problems:
+    rows.notes += (*edges.nodes_alone(), *notes_on_ignored(beside), *notes_on_comments(table.data))
+    take(rows, entries, how, share, edges.broken)
+    mended = [kind for kind, option in (("loop", how.drop_self_loops), ("zero", how.drop_zeros)) if option]
+    found = edges.broken.told(*mended)
+    if problems := [*header, *sorted(found, key=lambda problem: int(problem.place.removeprefix("line ")))]:
         place, message = one_message(problems, lambda *options: " ".join(options))
         raise FormatError(f"{', '.join(filter(None, (table.name, place)))}: {message}")
     return rows
@@ -163,26 +165,9 @@ class _Edges(EdgeList):
         assert weight is not None or low is not None
         columns = Columns(first, second, weight if low is None else low, titles=table.header)  # type: ignore[arg-type]
         super().__init__(table.name, columns, table.started)
-        self.weight, self.kept, self.problems = weight, [], list[Problem]()
+        self.weight, self.kept = weight, list[list[str]]()
+        self.ends = (*self.ends, *({table.columns[1], weight} - {None, self.ends[2]}))
         self.beside = [(k, column) for k, column in self.beside if k not in (weight, *table.columns)]
-
-    def no_edge(self, number: int, row: list[str]) -> None:
-        """Declare the node of a row without an edge, or note what is wrong with the row."""
-        with self._noted(number):
-            super().no_edge(number, row)
-
-    def more_fields(self, number: int, row: list[str], width: int) -> None:
-        """Note a row with fields beyond the header."""
-        with self._noted(number):
-            super().more_fields(number, row, width)
-
-    @contextmanager
-    def _noted(self, number: int) -> Iterator[None]:
-        try:
-            yield
-        except FormatError as error:
-            text, _, mend = str(error).removeprefix(f"{self.name}, line {number}: ").partition("; ")
-            self.problems.append(Problem(f"line {number}", text, mend))
 
     def entries(self, how: Reading) -> list[tuple[str, Entry]]:
         """Return the edges as they are told, each with its line."""
@@ -212,50 +197,40 @@ def _of_the_header(table: _Table, how: Reading) -> list[Problem]:
     return []
 
 
-def _take(
-    rows: IntervalRows,
-    entries: Sequence[tuple[str, Entry]],
-    how: Reading,
-    share: Fraction,
-    problems: list[Problem],
-    no_edges: Sequence[Problem],
+def take(
+    rows: IntervalRows, entries: Sequence[tuple[str, Entry]], how: Reading, share: Fraction, broken: Problems
 ) -> None:
-    """Take edges into ``rows``, and what is wrong into ``problems``: of each kind the first row, and how many."""
+    """Take edges into ``rows``, and what is wrong into ``broken``; self-loops and zeros are of these kinds."""
     seen: dict[tuple[str, str], str] = {}
-    broken = defaultdict[str, list[Problem]](list)
-    for problem in no_edges:
-        broken[problem.mend].append(problem)
     for place, entry in entries:
-        pair = entry.source, entry.target
-        if entry.source == entry.target:
+        pair, loop = (entry.source, entry.target), entry.source == entry.target
+        if loop:
             rows.loops += 1
-            text, mend = f"self-loop at node {shorten(entry.source)}", "remove it, or drop all with {}"
-            broken["loop"].append(Problem(place, text, mend, "--drop-self-loops"))
-        elif entry.always_zero:
-            rows.zeros += 1
+            text, mend = f"self-loop at node {shorten(str(entry.source))}", "remove it, or drop all with {}"
+            broken.add(Problem(place, text, mend, "--drop-self-loops"), "loop")
+        if entry.always_zero:
+            rows.zeros += not loop
             text, mend = f"{entry.place}: its weight is always 0", "remove it, or drop all with {}"
-            broken["zero"].append(Problem(place, text, mend, "--drop-zeros"))
-        else:
-            try:
-                edge = entry.interval(share)
-            except GraphError as error:
-                text, _, mend = str(error).partition("; ")
-                broken[mend].append(Problem(place, text, mend))
-                continue
-            again = pair if pair in seen else pair[::-1]
-            if again in seen and (again == pair or how.undirected):
-                mend = "an edge of both signs is two files (modes), or one interval with 0 inside"
-                if again != pair:
-                    mend = "--undirected makes each row both directions; keep one, or leave out --undirected"
-                text = f"second row for edge {_text(pair)} (the first is {seen[again]})"
-                broken["again"].append(Problem(place, text, mend))
-                continue
-            seen[pair] = place
-            rows.edges.append(edge)
-    for kind, option in (("loop", how.drop_self_loops), ("zero", how.drop_zeros)):
-        if option:
-            broken.pop(kind, None)
-    problems += sorted(map(first_of, broken.values()), key=lambda problem: int(problem.place.removeprefix("line ")))
+            if not loop:
+                broken.add(Problem(place, text, mend, "--drop-zeros"), "zero")
+            continue
+        try:
+            edge = entry.interval(share)
+        except GraphError as error:
+            text, _, mend = str(error).rpartition("; ")
+            broken.add(Problem(place, text, mend))
+            continue
+        again = pair if pair in seen else pair[::-1]
+        if loop:
+            continue
+        if again in seen and (again == pair or how.undirected):
+            mend = "an edge of both signs is two files (modes), or one interval with 0 inside"
+            if again != pair:
+                mend = "--undirected makes each row both directions; keep one, or leave out --undirected"
+            broken.add(Problem(place, f"second row for edge {_text(pair)} (the first is {seen[again]})", mend))
+            continue
+        seen[pair] = place
+        rows.edges.append(edge)
 
 
 def _text(pair: Sequence[str]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -18,15 +19,32 @@ class Problem:
     option: str = ""
 
 
-def first_of(some: Sequence[Problem]) -> Problem:
-    """Return the first of the problems of one kind, which says how many there are.
+class Problems:
+    """Rules that rows break: of each the first row, and how many rows there are.
 
     Examples
     --------
-    >>> first_of([Problem("line 2", "self-loop at a", ""), Problem("line 5", "self-loop at b", "")]).text
-    'self-loop at a (2 in all)'
+    >>> problems = Problems()
+    >>> problems.add(Problem("line 2", "self-loop at a", "remove it"))
+    >>> problems.add(Problem("line 5", "self-loop at b", "remove it"))
+    >>> [problem.text for problem in problems.told()]
+    ['self-loop at a (2 in all)']
     """
-    return replace(some[0], text=some[0].text + in_all(len(some)))
+
+    def __init__(self) -> None:
+        self._first: dict[str, Problem] = {}
+        self._count = Counter[str]()
+
+    def add(self, problem: Problem, kind: str = "") -> None:
+        """Take a problem of a kind, which its mend tells by default."""
+        kind = kind or problem.mend
+        self._first.setdefault(kind, problem)
+        self._count[kind] += 1
+
+    def told(self, *mended: str) -> list[Problem]:
+        """Return the first of every kind, which says how many there are, but for kinds that are mended."""
+        kinds = ((kind, one) for kind, one in self._first.items() if kind not in mended)
+        return [replace(one, text=one.text + in_all(self._count[kind])) for kind, one in kinds]
 
 
 def one_message(problems: Sequence[Problem], call: Callable[..., str]) -> tuple[str, str]:

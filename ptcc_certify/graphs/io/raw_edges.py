@@ -10,6 +10,7 @@ import numpy as np
 
 from ptcc_certify.errors import GraphError
 from ptcc_certify.graphs.io.columns_beside import Column
+from ptcc_certify.graphs.io.problems import Problem
 from ptcc_certify.graphs.labels import refuse_unnamed
 from ptcc_certify.graphs.rationals import shorten
 
@@ -56,6 +57,7 @@ class Rows:
     headerless: bool = False
     matrix: bool = False  # entries of a matrix, whose rows listen unless it is said that they inform
     notes: tuple[str, ...] = ()
+    problems: Sequence[Problem] = ()  # what is wrong with rows that are left out
     asks: str = ""  # why the direction must be told
     columns: bool = True  # may columns, or the attribute of weights, be told?
 

@@ -27,8 +27,10 @@ SIGN = (
     *("sign", "type", "edgetype", "effect", "relation", "relationship", "interaction", "interactiontype"),
     *("regulation", "polarity", "valence", "attitude", "mor"),
 )
-#: Attributes of edges that make a family of a graph.
-OF_EDGES = frozenset({"weight_min", "weight_max", "optional"})
+#: Titles of the least and the largest weight of an edge, and of whether it may fail, which make a family of a graph.
+_LEAST = ("weight_min", "min_weight", "w_min", "least", "min", "lower")
+_LARGEST = ("weight_max", "max_weight", "w_max", "largest", "max", "upper")
+_OPTIONAL = ("optional", "may_fail")
 #: What Gephi writes as the type of edges.
 DIRECTIONS = {"directed": False, "undirected": True}
 #: What is said of a word that is none for a sign.
@@ -115,3 +117,36 @@ def code_among(values: Sequence[Fraction], title: str) -> Fraction | None:
     if not numbers or (-1 in numbers and numbers <= {-1, 0, 1}):
         return None
     return next((v for v in values if v not in (-1, 1)), values[0])
+
+
+def interval_columns(first: Sequence[str], place: str) -> tuple[int | None, int | None, int | None]:
+    """Return the columns of the least and the largest weight, and that of edges that may fail; None of each it lacks.
+
+    Raises
+    ------
+    FormatError
+        One end of the intervals is named without the other.
+
+    Examples
+    --------
+    >>> interval_columns(["source", "target", "weight_min", "weight_max"], "a.csv")
+    (2, 3, None)
+    """
+    low, high, may_fail = (find(first, names, place) for names in (_LEAST, _LARGEST, _OPTIONAL))
+    if sum(plain(title) in map(plain, _OPTIONAL) for title in first) > 1:
+        raise FormatError(f"{place}: two columns tell whether edges may fail; leave one out")
+    if (low is None) != (high is None):
+        raise FormatError(f"{place}: names one end of the intervals; name weight_min and weight_max")
+    return low, high, may_fail
+
+
+def family_titles(titles: Sequence[str]) -> list[str]:
+    """Return titles of intervals of weights, or of edges that may fail: both ends, or one that says that they may.
+
+    Examples
+    --------
+    >>> family_titles(["source", "target", "min", "max"]), family_titles(["source", "target", "weight", "max"])
+    (['min', 'max'], [])
+    """
+    of = [[title for title in titles if plain(title) in map(plain, names)] for names in (_LEAST, _LARGEST, _OPTIONAL)]
+    return [*of[2], *of[0], *of[1]] if of[2] or (of[0] and of[1]) else []

@@ -7,7 +7,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ptcc_certify.errors import FormatError
-from ptcc_certify.graphs.io.signs import OF_EDGES, SIGN, WEIGHT, find, is_sign, plain, sign_of_word, weight_and_sign
+from ptcc_certify.graphs.io.signs import (
+    SIGN,
+    WEIGHT,
+    family_titles,
+    find,
+    is_sign,
+    plain,
+    sign_of_word,
+    weight_and_sign,
+)
 from ptcc_certify.graphs.io.text_matrices import is_entry
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
@@ -141,7 +150,7 @@ def _no_ends(titles: Sequence[str]) -> str:
 
 
 def _refuse_family(titles: Sequence[str], place: str) -> None:
-    if find(titles, sorted(OF_EDGES), place) is not None:
+    if family_titles(titles):
         what = "uncertain weights or optional edges, which make a family of graphs"
         mend = "name the columns of the ends source and target"
         if edge_columns(titles, place) is not None:

@@ -102,7 +102,7 @@ def table_as_matrix(table: Sequence[Line], name: str) -> Rows | None:
     corner = len(lines[0]) == len(lines[1]) and _NUMBER.fullmatch(lines[0][0]) is not None
     same = not corner and all(labels) and len(set(labels)) == n == len(columns) and set(columns) == set(labels)
     if same and all(len(line) == n + 1 for line in lines[1:]):
-        return _labelled(labels, columns, [line[1:] for line in lines[1:]], name)
+        return _labelled(labels, columns, [line[1:] for line in lines[1:]], name, bool(lines[0][0]))
     if not lines[0][0] and all(lines[0][1:]) and all(map(is_entry, filter(None, lines[1][1:]))) and lines[1][0]:
         what = "looks like a matrix with names, and its rows and columns have different ones"
         raise FormatError(f"{name}, line 1: {what}; give both the same, or write rows of edges")
@@ -112,15 +112,21 @@ def table_as_matrix(table: Sequence[Line], name: str) -> Rows | None:
     return _plain(lines)
 
 
-def _labelled(labels: list[str], columns: list[str], entries: list[list[str]], name: str) -> Rows | None:
+def _labelled(labels: list[str], columns: list[str], entries: list[list[str]], name: str, named: bool) -> Rows | None:
     for label, line in zip(labels, entries, strict=True):
         for column, text in zip(columns, line, strict=True):
             if not text:
                 raise FormatError(
                     f"{name}: row {shorten(label)}, column {shorten(column)} of the matrix is empty; write 0"
                 )
-    if not all(is_entry(text) for line in entries for text in line):
-        return None
+    if odd := [(k, m) for k, line in enumerate(entries) for m, text in enumerate(line) if not is_entry(text)]:
+        if named:
+            return None
+        k, m = odd[0]
+        text = entries[k][m]
+        mend = "write decimals with a point" if "," in text else "give a number"
+        place = f"row {shorten(labels[k])}, column {shorten(columns[m])} of the matrix"
+        raise FormatError(f'{name}: {place}: "{shorten(text)}" is not a number; {mend}')
     order = [columns.index(label) for label in labels]
     return _told(labels, [[line[k] for k in order] for line in entries])
 
