@@ -142,7 +142,10 @@ def _no_ends(titles: Sequence[str]) -> str:
 
 def _refuse_family(titles: Sequence[str], place: str) -> None:
     if find(titles, sorted(OF_EDGES), place) is not None:
-        what, mend = "uncertain weights or optional edges, which make a family of graphs", "name the columns of the ends source and target"
+        what, mend = (
+            "uncertain weights or optional edges, which make a family of graphs",
+            "name the columns of the ends source and target",
+        )
         if edge_columns(titles, place) is not None:
             mend = "ptcc classify, certify, simulate and plot take it, and ptcc_certify.read_family"
         raise FormatError(f"{place}: {what}; {mend}")
