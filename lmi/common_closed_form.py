@@ -20,9 +20,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lmi.common_lyapunov import CommonCertificate, UncertainMatrix, evaluate
+from lmi.common_lyapunov import CommonCertificate, evaluate
 from lmi.errors import NoCertificate
 from lmi.search_time import spend
+from lmi.uncertain_matrix import UncertainMatrix
 
 #: Shares of the slowest rate that are tried, equations solved for each, and steps of multipliers.
 _SHARES, _EQUATIONS, _STEPS = (0.0, 0.3, 0.5, 0.7, 0.85), 2, 20

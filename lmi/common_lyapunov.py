@@ -22,10 +22,10 @@ from typing import Any
 import numpy as np
 
 from lmi import child_process
-from lmi.diagonal import run_solver
 from lmi.errors import MatrixError, NoCertificate, OutOfTime
-from lmi.matrix_classes import square
-from lmi.search_time import checkpoint, seconds_left, spend, uncounted
+from lmi.rate_programs import program_seconds, rows_of, solved
+from lmi.search_time import spend
+from lmi.uncertain_matrix import UncertainMatrix
 
 #: Steps at most, and the relative gain that is worth another one.
 _STEPS, _GAIN = 12, 1e-4
@@ -37,61 +37,6 @@ _LEAST, _LARGEST_CONDITION = 1e-7, 1e12
 _TRUST = (0.3, 0.8)
 #: Weight of other directions than that of the state at which ``P`` is to be small.
 _ASIDE = 1e-3
-#: Rows up to which Clarabel takes a matrix as it is; with a diagonal ``P`` those of sparse matrices have zeros.
-_WHOLE_ROWS = {False: 60, True: 24}
-#: Seconds that a program takes for each block: what multiplies a power of its rows, by what ``P`` is.
-_SECONDS = {"full": (1.8e-7, 4), "diagonal": (2e-3, 1), "fixed": (0.02, 1)}
-
-
-@dataclass(frozen=True, eq=False)
-class UncertainMatrix:
-    """The matrices ``A + sum_e delta_e f_e h_e'`` with ``|delta_e| <= radii_e``.
-
-    Attributes
-    ----------
-    A : (n, n) array
-    F, H : (n, q) arrays
-        Columns ``f_e``, ``h_e``, none of them 0.
-    radii : (q,) array
-        Positive.
-
-    Examples
-    --------
-    >>> UncertainMatrix.known([[1.0, 2.0], [0.0, 1.0]]).radii
-    array([], dtype=float64)
-    """
-
-    A: np.ndarray
-    F: np.ndarray
-    H: np.ndarray
-    radii: np.ndarray
-
-    @classmethod
-    def known(cls, A: Any) -> UncertainMatrix:
-        """Return a matrix without uncertainty."""
-        A = square(A)
-        return cls(A, np.zeros((len(A), 0)), np.zeros((len(A), 0)), np.zeros(0))
-
-    def __post_init__(self) -> None:
-        n, q = len(self.A), len(self.radii)
-        arrays = (self.A, self.F, self.H, self.radii)
-        if self.A.shape != (n, n) or not self.F.shape == self.H.shape == (n, q) or self.radii.shape != (q,):
-            raise MatrixError("A is (n, n), F and H are (n, q), radii (q,)")
-        if not all(np.isfinite(x).all() for x in arrays) or not (self.radii > 0).all():
-            raise MatrixError("an entry is not a finite number, or a radius is not positive")
-
-    def transformed(self, R: np.ndarray) -> tuple[UncertainMatrix, np.ndarray]:
-        """Return the matrices of ``y = R x`` with ``|f| = |h|`` and radii 1, and by what to divide multipliers."""
-        A = np.linalg.solve(R.T, (R @ self.A).T).T
-        F, H = R @ (self.F * self.radii), np.linalg.solve(R.T, self.H)
-        scale = np.sqrt(_column_norms(H) / _column_norms(F))
-        return UncertainMatrix(A, F * scale, H / scale, np.ones(len(scale))), scale**2
-
-
-def _column_norms(X: np.ndarray) -> np.ndarray:
-    """Return the norms of columns that are not 0, also where squares of their entries are beyond floats."""
-    largest = np.abs(X).max(axis=0, initial=0.0)
-    return largest * np.linalg.norm(X / largest, axis=0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -285,68 +230,12 @@ class _Search:
     def _solve(
         self, modes: Sequence[UncertainMatrix], rates: Sequence[float], least: float
     ) -> tuple[np.ndarray, list[np.ndarray]]:
-        with uncounted():
-            import cvxpy as cp
-        checkpoint()
-        n = len(modes[0].A)
         unit = max(float(np.abs(mode.A).max(initial=0.0)) for mode in modes) or 1.0
-        p = cp.Variable(n) if self.diagonal else cp.Variable((n, n), symmetric=True)
-        P = cp.diag(p) if self.diagonal else p
-        t = cp.Variable(1 if self.shares is None else len(modes))
-        constraints = [p >= least, p <= 1] if self.diagonal else [P >> least * np.eye(n), P << np.eye(n)]
-        taus = []
-        for i, mode in enumerate(modes):
-            tau = cp.Variable(len(mode.radii)) if mode.radii.size else None
-            own, rise = (min(rates), t[0]) if self.shares is None else (rates[i], t[i])
-            constraints.append(inequality(P, mode, tau, own, rise, unit) >> 0)
-            taus.append(tau)
-        problem = cp.Problem(cp.Maximize(t[0] if self.shares is None else self.shares @ t), constraints)
+        own = [min(rates)] * len(modes) if self.shares is None else rates
+        shares = np.ones(1) if self.shares is None else self.shares
         spend(program_seconds(modes, "diagonal" if self.diagonal else "full"))
-        run_program(problem, n + max(mode.radii.size for mode in modes), self.tolerance, self.diagonal)
-        if p.value is None or not np.isfinite(p.value).all():
-            raise NoCertificate(f"the solver answered {problem.status}")
-        value = np.diag(p.value) if self.diagonal else (p.value + p.value.T) / 2
-        return value, [np.zeros(0) if tau is None else tau.value for tau in taus]
-
-
-def inequality(P: Any, mode: UncertainMatrix, tau: Any, b: Any, t: Any, unit: float) -> Any:
-    """Return the matrix of the module's inequality over ``unit``, in coordinates of radii 1, minus ``t I``."""
-    import cvxpy as cp
-    from scipy import sparse
-
-    n = len(mode.A)
-    product = P @ sparse.csr_array(mode.A / unit)  # keeps the zeros, of which chordal decomposition makes use
-    form = product + product.T - (b / unit) * P - t * np.eye(n)
-    if tau is None:
-        return form
-    H, F = (sparse.csr_array(x / math.sqrt(unit)) for x in (mode.H, mode.F))
-    coupling = P @ F
-    return cp.bmat([[form - H @ cp.diag(tau) @ H.T, coupling], [coupling.T, cp.diag(tau)]])
-
-
-def program_seconds(modes: Sequence[UncertainMatrix], shape: str) -> float:
-    """Return about how long a program with an inequality for each mode takes, from sizes alone.
-
-    Examples
-    --------
-    >>> one = UncertainMatrix.known(np.eye(24))
-    >>> program_seconds([one], "diagonal") < program_seconds([one], "full") < program_seconds([one, one], "full") < 1
-    True
-    """
-    factor, power = _SECONDS[shape]
-    return sum(factor * float(len(mode.A) + mode.radii.size) ** power for mode in modes)
-
-
-def run_program(problem: Any, rows: int, tolerance: float, diagonal: bool = False) -> None:
-    """Solve a program of blocks of so many rows at most; whether it was solved is asked by the caller."""
-    options: dict[str, Any] = {"tol_gap_abs": tolerance * 1e-2, "tol_gap_rel": tolerance, "tol_feas": tolerance * 1e-2}
-    options["chordal_decomposition_enable"] = rows > _WHOLE_ROWS[diagonal]
-    options["chordal_decomposition_merge_method"] = "parent_child"
-    options["time_limit"] = seconds_left()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # "solution may be inaccurate": every result is recomputed by the caller
-        run_solver(problem, "clarabel", options)
-    checkpoint()
+        rows = rows_of(modes, own, unit)
+        return solved("rates", self.diagonal, [np.array(least), shares], rows, self.tolerance)
 
 
 def least_condition(
@@ -434,35 +323,14 @@ def _least_form(
     """Minimise the trace of ``moment Q``, or the condition of ``Q``, over ``P = R'Q R`` of these rates, ``Q >= I``."""
     if child_process.forked:
         raise NoCertificate("Clarabel is not run in a forked process")
-    with uncounted():
-        import cvxpy as cp
-    n = len(R)
     pairs = [mode.transformed(R) for mode in modes]
-    q = cp.Variable(n) if diagonal else cp.Variable((n, n), symmetric=True)
-    Q = cp.diag(q) if diagonal else q
-    constraints = [q >= 1] if diagonal else [Q >> np.eye(n)]
-    if moment is None:
-        goal = cp.Variable()
-        constraints.append(q <= goal if diagonal else Q << goal * np.eye(n))
-    else:
-        goal = cp.sum(cp.multiply(moment, Q))
-    taus = []
-    for (mode, _), rate in zip(pairs, rates, strict=True):
-        taus.append(cp.Variable(len(mode.radii)) if mode.radii.size else None)
-        unit = float(np.abs(mode.A).max(initial=0.0)) or 1.0
-        constraints.append(inequality(Q, mode, taus[-1], rate, 0.0, unit) >> 0)
-    problem = cp.Problem(cp.Minimize(goal), constraints)
+    rows = rows_of([mode for mode, _ in pairs], rates)
     spend(program_seconds(modes, "diagonal" if diagonal else "full"))
-    run_program(problem, n + max(mode.radii.size for mode in modes), tolerance, diagonal)
-    if q.value is None or not np.isfinite(q.value).all():
-        raise NoCertificate(f"the solver answered {problem.status}")
-    value = np.diag(q.value) if diagonal else (q.value + q.value.T) / 2
-    value = R.T @ value @ R
+    goal, numbers = ("condition", []) if moment is None else ("trace", [moment])
+    Q, taus = solved(goal, diagonal, numbers, rows, tolerance)
+    value = R.T @ Q @ R
     value, top = (value + value.T) / 2, float(np.linalg.eigvalsh(value)[-1])
-    multipliers = [
-        np.zeros(0) if tau is None else np.maximum(tau.value, 1e-12) / scale / top
-        for tau, (_, scale) in zip(taus, pairs, strict=True)
-    ]
+    multipliers = [np.maximum(tau, 1e-12) / scale / top for tau, (_, scale) in zip(taus, pairs, strict=True)]
     return evaluate(value / top, modes, multipliers)
 
 
@@ -523,22 +391,10 @@ def best_multipliers(certificate: CommonCertificate, modes: Sequence[UncertainMa
             continue
         own, scale = mode.transformed(R)
         with contextlib.suppress(NoCertificate, OutOfTime, np.linalg.LinAlgError):
-            tau = np.maximum(_multipliers(own), 1e-12) / scale
+            spend(program_seconds([own], "fixed"))
+            _, (best,) = solved("multipliers", False, [], rows_of([own], [0.0]), 1e-7)
+            tau = np.maximum(best, 1e-12) / scale
             rate = evaluate(P, [mode], [tau]).rate
             if rate > rates[i]:
                 taus[i], rates[i] = tau, rate
     return replace(certificate, rates=tuple(rates), multipliers=tuple(taus))
-
-
-def _multipliers(mode: UncertainMatrix) -> np.ndarray:
-    with uncounted():
-        import cvxpy as cp
-    checkpoint()
-    unit = float(np.abs(mode.A).max(initial=0.0)) or 1.0
-    tau, t = cp.Variable(len(mode.radii)), cp.Variable()
-    problem = cp.Problem(cp.Maximize(t), [inequality(np.eye(len(mode.A)), mode, tau, 0.0, t, unit) >> 0])
-    spend(program_seconds([mode], "fixed"))
-    run_program(problem, len(mode.A) + len(mode.radii), 1e-7)
-    if tau.value is None or not np.isfinite(tau.value).all():
-        raise NoCertificate(f"the solver answered {problem.status}")
-    return tau.value

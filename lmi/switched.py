@@ -16,17 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from lmi import child_process
-from lmi.common_lyapunov import (
-    CommonCertificate,
-    UncertainMatrix,
-    common_lyapunov,
-    evaluate,
-    inequality,
-    program_seconds,
-    run_program,
-)
+from lmi.common_lyapunov import CommonCertificate, common_lyapunov, evaluate
 from lmi.errors import MatrixError, NoCertificate, OutOfTime
+from lmi.rate_programs import inequality, multipliers, program_seconds, rows_of, run_program
 from lmi.search_time import checkpoint, spend, uncounted
+from lmi.uncertain_matrix import UncertainMatrix
 
 #: Steps at most for one ``m``, the relative gain that is worth another one, and values of ``ln m`` that are tried.
 _STEPS, _GAIN, _TRIALS = 8, 1e-3, 6
@@ -173,11 +167,9 @@ class _Program:
         unit = max(float(np.abs(mode.A).max(initial=0.0)) for mode in self.modes) or 1.0
         t = cp.Variable()
         constraints, forms, taus = [], [], []
-        for mode in self.modes:
-            P = cp.Variable((n, n), symmetric=True)
-            tau = cp.Variable(len(mode.radii)) if mode.radii.size else None
-            constraints += [P >> _LEAST * np.eye(n), P << np.eye(n)]
-            constraints.append(inequality(P, mode, tau, self.rate, t, unit) >> 0)
+        for row in rows_of(self.modes, [self.rate] * len(self.modes), unit):
+            P, tau = cp.Variable((n, n), symmetric=True), multipliers(row)
+            constraints += [P >> _LEAST * np.eye(n), P << np.eye(n), inequality(P, row, tau, t) >> 0]
             forms.append(P)
             taus.append(tau)
         common = [S.T @ P @ S for S, P in zip(self.factors, forms, strict=True)]

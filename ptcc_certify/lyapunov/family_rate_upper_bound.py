@@ -26,9 +26,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from lmi.common_lyapunov import UncertainMatrix
 from lmi.dyadic import round_to_bits
 from lmi.search_time import checkpoint
+from lmi.uncertain_matrix import UncertainMatrix
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.lyapunov.family_function import FamilyFunction, rounded_up
 from ptcc_certify.lyapunov.quotient import Quotient

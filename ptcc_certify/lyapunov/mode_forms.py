@@ -18,13 +18,14 @@ from fractions import Fraction
 
 import numpy as np
 
-from lmi.common_lyapunov import CommonCertificate, UncertainMatrix, best_multipliers, common_lyapunov, evaluate
+from lmi.common_lyapunov import CommonCertificate, best_multipliers, common_lyapunov, evaluate
 from lmi.definiteness_proofs import prove_generalized_margin
 from lmi.dyadic import round_to_bits
 from lmi.errors import LMIError, OutOfTime
 from lmi.exact.elementary_enclosures import rounded
 from lmi.search_time import checkpoint
 from lmi.switched import SwitchedCertificate, switched_lyapunov
+from lmi.uncertain_matrix import UncertainMatrix
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.error_system import rounded_matrix
 from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends, prove_mode, with_constants

@@ -22,7 +22,7 @@ from functools import cached_property
 
 import numpy as np
 
-from lmi.common_lyapunov import UncertainMatrix
+from lmi.uncertain_matrix import UncertainMatrix
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.structure import analyse

@@ -9,7 +9,8 @@ import pytest
 
 import lmi
 from lmi.child_process import apart
-from lmi.common_lyapunov import UncertainMatrix, best_multipliers, common_lyapunov, evaluate, least_condition
+from lmi.common_lyapunov import best_multipliers, common_lyapunov, evaluate, least_condition
+from lmi.uncertain_matrix import UncertainMatrix
 
 
 def uncertain(rng, n=3, q=3):

@@ -7,7 +7,8 @@ import pytest
 
 import lmi
 from lmi.common_closed_form import closed_form_lyapunov, tuned_multipliers
-from lmi.common_lyapunov import UncertainMatrix, best_multipliers, common_lyapunov, evaluate
+from lmi.common_lyapunov import best_multipliers, common_lyapunov, evaluate
+from lmi.uncertain_matrix import UncertainMatrix
 
 
 def uncertain(seed: int, n: int = 6, q: int = 5) -> UncertainMatrix:

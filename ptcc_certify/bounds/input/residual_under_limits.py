@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property, partial
@@ -62,8 +63,7 @@ class LimitedBounds:
         With sampling, which may drive the agents apart, that is certified which leaves ``||E||`` no larger than at
         first.
         """
-        top = limits.largest_gain(self.bounds.gain)
-        clock = rounded(limits.clock_below(self.bounds.gain), BOUND_BITS)  # short of what other roundings find
+        top, clock = self._of(limits)
         each = [partial(self._bound_by, k, limits, clock, top) for k in self.functions]
         best = least(each, lambda entry: entry.norm)
         if best is not None and limits.sample_period is None:
@@ -74,6 +74,11 @@ class LimitedBounds:
             (partial(self._add_noise, k, best, top) for k in self.functions), lambda entry: entry.noisy_largest
         )
         return noisy or best
+
+    def _of(self, limits: Limits) -> tuple[Fraction, Fraction]:
+        """Return the largest gain, and the clock that is left, short of what other roundings find."""
+        gain = self.bounds.gain
+        return limits.largest_gain(gain), rounded(limits.clock_below(gain), BOUND_BITS)
 
     def _bound_by(self, k: int, limits: Limits, clock: Fraction, top: Fraction) -> Limited | None:
         """Return what one Lyapunov function proves."""
@@ -122,11 +127,20 @@ class LimitedBounds:
         T, bounds = nearest_float(gain.T), self.bounds
         sizes = {k: log(decaying(bounds, k, None)) - log(self.first) for k in growths}
 
+        def excesses(period: float) -> dict[int, float]:
+            return {k: sizes[k] + _log_share(gain, limits, period, bounds.form(k).rate, m) for k, m in growths.items()}
+
         def excess(period: float) -> float:
-            logarithms = (
-                sizes[k] + _log_share(gain, limits, period, bounds.form(k).rate, m) for k, m in growths.items()
-            )
-            return min(logarithms, default=math.inf)
+            return min(excesses(period).values(), default=math.inf)
+
+        def proved(period: Fraction) -> bool:
+            held, by_size = replace(limits, sample_period=period), excesses(nearest_float(period))
+            top, clock = self._of(held)
+            for k in sorted(growths, key=by_size.__getitem__):
+                with suppress(ValueError, ArithmeticError):
+                    if self._bound_by(k, held, clock, top) is not None:
+                        return True
+            return False
 
         high = nearest_float(limits.sample_period or gain.T)
         low = high / 2
@@ -138,7 +152,7 @@ class LimitedBounds:
             middle = (low + high) / 2
             low, high = (middle, high) if excess(middle) <= 0 else (low, middle)
         periods = (Fraction(f"{low * share:.3e}") for share in PERIOD_SHARES)
-        return next((h for h in periods if self.bound_residual(replace(limits, sample_period=h)) is not None), None)
+        return next(filter(proved, periods), None)
 
 
 def _log_share(gain: Gain, limits: Limits, period: float, rate: Fraction, growth: Fraction) -> float:
