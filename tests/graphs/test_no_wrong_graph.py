@@ -489,7 +489,132 @@ OTHERS = [
         "g.csv", "version https://git-lfs.github.com/spec/v1\noid sha256:1\nsize 9\n", says=("Git LFS", "git lfs pull")
     ),
 ]
-INPUTS = SIGNS + UNKNOWN_SIGNS + DIRECTIONS + SIGNS_BESIDE + ORDINARY + LAPLACIANS + ROWS + MATRICES + FORMATS + OTHERS
+
+
+def gml(edge: str) -> str:
+    nodes = 'node [ id 0 label "a" ] node [ id 1 label "b" ]'
+    return f"graph [ directed 1 {nodes} edge [ source 0 target 1 {edge} ] ]"
+
+
+#: The key of another attribute of edges, with the title of the weight.
+SECOND_KEY = '<key id="x" for="edge" attr.name="{}" attr.type="double"/><key id="v" '
+TITLED = '<attributes class="edge"><attribute id="0" title="sign" type="integer"/>'
+#: What libraries and readers of ours took for another number, merged or dropped.
+NUMBERS_AND_ATTRIBUTES = [
+    *(
+        Input("g.gml", gml(f"weight {text}"), f"a>b={weight}")
+        for text, weight in [
+            ("1e-05", "1/100000"),
+            ("-1e-05", "-1/100000"),
+            ("1e+20", "100000000000000000000"),
+            ("1E-05", "1/100000"),
+            (".5", "1/2"),
+            ("5.", "5"),
+            ("+1", "1"),
+            ("1.5E3", "1500"),
+            ("-.5e-3", "-1/2000"),
+            ("5.e1", "50"),
+            ('"1e-05"', "1/100000"),
+            ("1 # 1e-05 1x\n", "1"),
+        ]
+    ),
+    *(Input("g.gml", gml(f"weight {text}"), says=("not a finite number",)) for text in ("INF", "-INF", "NAN", "1e400")),
+    Input("g.gml", gml("weight 1e-400"), says=("outside the range of float64",)),
+    Input("g.gml", gml("weight 1x 2"), says=("line 1", '"1x" is no number')),
+    Input("g.gml", gml('weight 2 note "1x 1e-05"'), "a>b=2"),
+    Input("g.gml", gml("weight 1 weight -1"), says=("edge a -> b", 'two attributes are named "weight" (1 and -1)')),
+    Input("g.gml", gml("weight 1 Weight -1"), says=("edge a -> b", 'two attributes are named "weight" (1 and -1)')),
+    Input("g.gml", gml("weight 2 Weight 2.0"), "a>b=2"),
+    Input("g.gml", gml('weight 2 tag "x" tag "y"'), "a>b=2"),
+    Input("g.gml", gml('weight 2 kind "activates" kind "inhibits"'), says=('named "kind" (activates and inhibits)',)),
+    Input("g.graphml", graphml('<data key="w">2</data><data key="w">-2</data>'), says=('"weight" (2.0 and -2.0)',)),
+    *(
+        Input(
+            "g.graphml",
+            graphml('<data key="w">2</data><data key="x">-2</data>').replace('<key id="v" ', SECOND_KEY.format(title)),
+            says=("edge n0 -> n1", 'two attributes are named "weight" (2.0 and -2.0)'),
+        )
+        for title in ("weight", "Weight")
+    ),
+    Input("g.graphml", graphml('<data key="w">1e-05</data>'), "n0>n1=1/100000"),
+    Input("g.graphml", graphml('<data key="w">1e-400</data>'), says=("outside the range of float64",)),
+    *(
+        Input(
+            "g.graphml",
+            graphml('<data key="w">2</data>').replace('target="n1"', f'target="n1" directed="{told}"'),
+            *is_,
+        )
+        for told, is_ in [
+            ("1", ("n0>n1=2",)),
+            ("true", ("n0>n1=2",)),
+            ("0", ("", ("directed=false edge",))),
+            ("no", ("", ('directed="no"', "true or false"))),
+        ]
+    ),
+    Input(
+        "g.graphml",
+        graphml('<data key="w">2</data>').replace('"directed"', '"Directed"'),
+        says=('edgedefault="Directed"; write edgedefault="directed"',),
+    ),
+    Input(
+        "g.graphml",
+        graphml('<data key="w">2</data>').replace(' edgedefault="directed"', ""),
+        says=("no edgedefault; write",),
+    ),
+    Input(
+        "g.json",
+        '[{"source": "a", "target": "b", "weight": 2, "Weight": -2}]',
+        says=("edge a -> b", 'two attributes are named "weight" (2 and -2)'),
+    ),
+    Input(
+        "g.json",
+        '[{"source": "a", "target": "b", "weight": 2, "Weight": -2}]',
+        says=('"weight" (2 and -2)',),
+        how={"columns": "source,target,weight"},
+    ),
+    Input("g.json", '[{"source": "a", "target": "b", "weight": 2, "Weight": 2.0}]', "a>b=2"),
+    *(Input("g.gexf", gexf(edge=f'weight="2" {title}="inhibits"'), "ann>bob=-2") for title in ("label", "kind")),
+    *(
+        Input("g.gexf", gexf(edge=edge, values=values).replace(TITLED, f"{TITLED}{more}"), edges, says)
+        for more, edge, values, edges, says in [
+            ("", 'weight="2"', '<attvalue id="0" value="-1"/>', "ann>bob=-2", ()),
+            (
+                '<attribute id="1" title="Weight"/>',
+                'weight="2"',
+                '<attvalue for="1" value="-3"/>',
+                "",
+                ("edge ann -> bob", '"weight" (2 and -3)'),
+            ),
+            ('<attribute id="1" title="Weight"/>', 'weight="2"', '<attvalue for="1" value="2.0"/>', "ann>bob=2", ()),
+            (
+                '<attribute id="1" title="Weight"><default>1</default></attribute>',
+                'weight="2"',
+                "",
+                "ann>bob=2",
+                (),
+            ),
+            (
+                '<attribute id="1" title="Sign"/>',
+                'weight="2"',
+                '<attvalue for="0" value="1"/><attvalue for="1" value="-1"/>',
+                "",
+                ('"sign" (1 and -1)', "keep one"),
+            ),
+            (
+                '<attribute id="1" title="weight"/>',
+                "",
+                '<attvalue for="1" value="2" start="1"/><attvalue for="1" value="-2" start="2"/>',
+                "",
+                ('"weight" (2 and -2)', "keep one"),
+            ),
+            ("", "", '<attvalue for="weight" value="-2"/>', "ann>bob=-2", ()),
+        ]
+    ),
+]
+INPUTS = [
+    *(SIGNS + UNKNOWN_SIGNS + DIRECTIONS + SIGNS_BESIDE + ORDINARY + LAPLACIANS + ROWS + MATRICES + FORMATS + OTHERS),
+    *NUMBERS_AND_ATTRIBUTES,
+]
 
 
 def put(folder: Path, name: str, content: str | bytes) -> Path:
