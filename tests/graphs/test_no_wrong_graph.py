@@ -611,9 +611,50 @@ NUMBERS_AND_ATTRIBUTES = [
         ]
     ),
 ]
+#: Labels that are not one for each node, fields that are separated otherwise, graphs without edges, small numbers.
+ROWS_AND_MATRICES = [
+    *(
+        Input("g.dl", f"dl n=3 format={layout}\nlabels:\na a b\ndata:\n{rows}\n", says=("same label",))
+        for layout, rows in [
+            ("edgelist1", "1 2 1\n2 1 -1"),
+            ("edgelist1", "1 2 1\n2 3 -1"),
+            ("nodelist1", "1 2\n2 3"),
+            ("fullmatrix", "0 1 0\n0 0 1\n1 0 0"),
+        ]
+    ),
+    *(
+        Input("g.dl", f"dl n=3\n{labels}data:\n0 1 0\n0 0 -2\n5 0 0\n", edges, says)
+        for labels, edges, says in [
+            ("row labels:\na b c\ncolumn labels:\na b c\n", "b>a=1 c>b=-2 a>c=5", ()),
+            ("row labels:\na b c\ncolumn labels:\nc b a\n", "", ("labels of rows and columns differ",)),
+            ("ROW LABELS:\na b c\nCOL LABELS:\nc b a\n", "", ("labels of rows and columns differ",)),
+            ("column labels:\na b c\n", "b>a=1 c>b=-2 a>c=5", ()),
+        ]
+    ),
+    Input("g.dl", "dl n=4 format=edgelist1\nlabels embedded\ndata:\na b 1\nb c -1\n", says=("3 nodes, and n=4",)),
+    Input("g.dl", "dl n=2 format=edgelist1\nlabels embedded\ndata:\na b 1\nb c -1\n", says=("3 nodes, and n=2",)),
+    Input("g.sif", "a\tactivates\tb\nb inhibits c\n", says=("line 2", "one field here", "by tabs")),
+    Input("g.sif", "a activates b\nb,inhibits,c\n", says=("line 2", "one field here", "by blanks")),
+    Input("g.sif", "a\tactivates\tb\n#b c\tinhibits\td\n", says=("line 2", "a row or a comment")),
+    Input("g.sif", "a\tactivates\tb\nprotein kinase C\n", "a>b=1"),
+    *(
+        Input("g.sif", f"b inhibits c\n#a {relation} b\n", says=("line 2", "a row or a comment", '"# "'))
+        for relation in ("activates", "-1", "-")
+    ),
+    *(
+        Input("g.sif", f"{comment}\nb inhibits c\n", "b>c=-1")
+        for comment in ("# a activates b", "#", "##1 - 2", "#source interaction target", "#all of it")
+    ),
+    *(
+        Input("g.mtx", f"%%MatrixMarket matrix {rows}\n", says=("entry -1e-400 is outside the range of float64",))
+        for rows in ("array real general\n2 2\n0\n0.0e5\n-1e-400\n0", "coordinate real general\n2 2 1\n2 1 -1e-400")
+    ),
+    Input("g.mtx", "%%MatrixMarket matrix array real general\n2 2\n0 0.0e5\n-1e-300 -0\n", f"2>1=-1/{10**300}"),
+]
 INPUTS = [
     *(SIGNS + UNKNOWN_SIGNS + DIRECTIONS + SIGNS_BESIDE + ORDINARY + LAPLACIANS + ROWS + MATRICES + FORMATS + OTHERS),
     *NUMBERS_AND_ATTRIBUTES,
+    *ROWS_AND_MATRICES,
 ]
 
 
@@ -963,6 +1004,28 @@ LATE = ptcc.LateMessages(delay="0.1")
 def test_arguments_that_are_none_of_what_is_asked_are_refused(call: Any):
     with pytest.raises(ParameterError):
         call(io.StringIO("a,b,1"))
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("g.csv", "a\nb\nc\n"),
+        ("g.csv", "0 0 0\n0 0 0\n0 0 0\n"),
+        ("g.txt", "[0 0 0; 0 0 0; 0 0 0]"),
+        ("g.npy", npy(np.zeros((3, 3)))),
+        ("g.npy", npy(np.zeros((3, 3)), "i8")),
+        ("g.mtx", mtx(np.zeros((3, 3)))),
+        ("g.sif", "a\nb\nc\n"),
+        ("g.dl", "dl n=3\ndata:\n0 0 0\n0 0 0\n0 0 0\n"),
+        ("g.gml", "graph [ directed 1 node [ id 0 ] node [ id 1 ] node [ id 2 ] ]"),
+    ],
+)
+def test_a_graph_without_edges_is_its_own_laplacian(tmp_path, name, content):
+    graph = read_graph(put(tmp_path, name, content), laplacian=True)
+    assert (graph.n_nodes, graph.n_edges) == (3, 0)
+    assert ptcc.as_graph(np.zeros((2, 2)), "listens", laplacian=True).n_edges == 0
+    with pytest.raises(FormatError, match="no Laplacian"):
+        read_graph(put(tmp_path, "g.npy", npy(np.eye(3))), laplacian=True)
 
 
 @pytest.mark.parametrize("command", ["classify", "certify", "simulate", "design", "plot", "check", "batch", "explore"])
