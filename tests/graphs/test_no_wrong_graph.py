@@ -573,7 +573,15 @@ NUMBERS_AND_ATTRIBUTES = [
         how={"columns": "source,target,weight"},
     ),
     Input("g.json", '[{"source": "a", "target": "b", "weight": 2, "Weight": 2.0}]', "a>b=2"),
-    *(Input("g.gexf", gexf(edge=f'weight="2" {title}="inhibits"'), "ann>bob=-2") for title in ("label", "kind")),
+    *(
+        Input("g.gexf", gexf(edge=f'weight="2" {title}="inhibits"'), "ann>bob=-2")
+        for title in ("label", "kind", "sign")
+    ),
+    Input("g.graphml", graphml('<data key="w">2</data>').replace(' target="n1"', ' target="n1" sign="-1"'), "n0>n1=-2"),
+    Input("g.graphml", graphml("").replace(' target="n1"', ' target="n1" weight="-2"'), "n0>n1=-2"),
+    Input("g.net", NET + '*Arcs\n1 2 2 l "inhibits" c Red\n2 3 1 l activates\n', "ann>bob=-2 bob>eve=1"),
+    Input("g.net", NET + '*Arcs\n1 2 2 l "inhibits"\n2 3 1 c Red\n', says=('"label" holds inhibits', "signs")),
+    Input("g.net", NET + '*Arcs\n1 2 -2 l "a b"\n*Edges\n2 3 1 l "c"\n', "ann>bob=-2 bob>eve=1 eve>bob=1"),
     *(
         Input("g.gexf", gexf(edge=edge, values=values).replace(TITLED, f"{TITLED}{more}"), edges, says)
         for more, edge, values, edges, says in [

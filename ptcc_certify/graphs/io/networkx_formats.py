@@ -19,6 +19,9 @@ from ptcc_certify.graphs.io.text_matrices import is_entry
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
 
+#: Times of edges in GEXF, and what else elements of edges say of them in GEXF and GraphML.
+_TIMES = {"start", "end", "startopen", "endopen", "timestamp", "timestamps", "interval", "intervals"}
+_OF_ELEMENTS = {"id", "source", "target", "type", "directed", "sourceport", "targetport", *_TIMES}
 _TOKENS_OF_GML = re.compile(r'"[^"]*"|#.*|(?<![\w.])[+-]?\.?\d[^\s"#\[\]]*')
 _NUMBER_OF_GML = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))([eE][+-]?\d+)?")
 
@@ -92,6 +95,11 @@ def _tag(element: ElementTree.Element) -> str:
     return element.tag.rpartition("}")[2]
 
 
+def _own(edge: ElementTree.Element) -> list[tuple[str, str]]:
+    """Return the attributes of the element of an edge that say nothing of its ends, its direction and its times."""
+    return [(title, value) for title, value in edge.items() if title not in _OF_ELEMENTS and value]
+
+
 def _value(key: ElementTree.Element, element: ElementTree.Element) -> tuple[str, str]:
     """Return the title and the text of a value under a key."""
     text = element.text or ""
@@ -100,7 +108,7 @@ def _value(key: ElementTree.Element, element: ElementTree.Element) -> tuple[str,
 
 def _of_graphml(edge: ElementTree.Element, more: dict[str, Any], keys: dict[str | None, ElementTree.Element]) -> Pairs:
     """Return what an edge holds, values under one title too, which networkx merges to ``more``."""
-    pairs = [_value(keys[one.get("key")], one) for one in edge if _tag(one) == "data" and not len(one)]
+    pairs = [_value(keys[one.get("key")], one) for one in edge if _tag(one) == "data" and not len(one)] + _own(edge)
     titles = {title for title, _ in pairs} | {""}
     return [*filter(all, pairs), *((title, value) for title, value in more.items() if title not in titles)]
 
@@ -188,10 +196,9 @@ def read_gexf(data: bytes, name: str, how: Reading) -> Rows:
                     raise FormatError(f"{name}: {end} {shorten(str(edge.get(end)))} of an edge is no node; declare it")
             ends.append((number[edge.get("source", "")], number[edge.get("target", "")]))
             of = [(one.get("for", one.get("id", "")), one.get("value", "")) for one in edge.iter("attvalue")]
-            own = [(title, edge.get(title)) for title in ("weight", "label", "kind") if edge.get(title)]
-            attributes.append([*own, *((titles.get(key, key), value) for key, value in of)])
+            attributes.append([*_own(edge), *((titles.get(key, key), value) for key, value in of)])
             undirected.append(edge.get("type", kind) != "directed")
         rows = attribute_rows(labels, ends, attributes, name, how, rest)
-        timed = any({"start", "end", "startopen", "endopen", "timestamp"} & {*one.keys()} for one in graphs[0].iter())
+        timed = any(_TIMES & {*one.keys()} for one in graphs[0].iter())
         rows.notes = (TIMES,) if timed or graphs[0].find(".//spells") is not None else ()
         return both_ways(rows, undirected, 'edges of type "undirected"', how)
