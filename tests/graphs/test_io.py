@@ -787,8 +787,16 @@ BAD_FILES = [
     ("g.graphml", graphml().replace("lonely", "\xe9").encode("latin-1"), ["line 7:", "0xe9", "UTF-8"]),
     ("g.graphml", graphml().encode("utf-16"), ["UTF-8"]),
     ("g.graphml", graphml("undirected"), ["undirected", "--undirected"]),
-    ("g.graphml", graphml().replace("<edge id", '<edge directed="false" id'), ["directed=false"]),
-    ("g.graphml", graphml("undirected").replace("<edge id", '<edge directed="true" id'), ["directed=true"]),
+    (
+        "g.graphml",
+        graphml().replace("<edge id", '<edge directed="false" id'),
+        ['edge 1 -> b has directed="false"', "as two"],
+    ),
+    (
+        "g.graphml",
+        graphml("undirected").replace("<edge id", '<edge directed="true" id'),
+        ['edge 1 -> b has directed="true"', "as two"],
+    ),
     ("g.graphml", graphml(data=""), ["edge b -> 1 has no weight"]),
     ("g.graphml", graphml(data='<data key="d0"/>'), ["edge b -> 1 has no weight"]),
     ("g.graphml", graphml(data='<data key="d0">strong</data>'), ["GraphML", "strong"]),

@@ -547,8 +547,8 @@ NUMBERS_AND_ATTRIBUTES = [
         for told, is_ in [
             ("1", ("n0>n1=2",)),
             ("true", ("n0>n1=2",)),
-            ("0", ("", ("directed=false edge",))),
-            ("no", ("", ('directed="no"', "true or false"))),
+            ("0", ("", ('edge n0 -> n1 has directed="0"', "as two"))),
+            ("no", ("", ('edge n0 -> n1 has directed="no"',))),
         ]
     ),
     Input(

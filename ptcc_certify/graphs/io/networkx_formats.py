@@ -69,10 +69,11 @@ def read_graphml(data: bytes, name: str, how: Reading) -> Rows:
             raise FormatError(f'{name}: {what}; write edgedefault="directed", or "undirected"')
         for k, edge in enumerate(elements["edge"]):
             edge.set("id", str(k))
-            if (told := edge.get("directed")) is not None:
-                edge.set("directed", {"0": "false", "1": "true"}.get(told.strip(), told.strip()))
-                if edge.get("directed") not in ("true", "false"):
-                    raise FormatError(f'{name}: directed="{shorten(told)}" of an edge; write true or false')
+            told = edge.attrib.pop("directed", kind).strip()
+            if {"0": "undirected", "false": "undirected", "1": "directed", "true": "directed"}.get(told, told) != kind:
+                ends = " -> ".join(shorten(edge.get(end, "")) for end in ("source", "target"))
+                what = f'edge {ends} has directed="{shorten(told)}", and the graph edgedefault="{kind}"'
+                raise FormatError(f"{name}: {what}; write all as directed, one without direction as two")
         graph = nx.parse_graphml(ElementTree.tostring(root, "unicode"), edge_key_type=str, force_multigraph=True)
         declared = Counter(node.get("id", "") for node in elements["node"])
         for node in {**declared, **dict.fromkeys(graph)}:
