@@ -513,7 +513,181 @@ OTHERS = [
         "g.csv", "version https://git-lfs.github.com/spec/v1\noid sha256:1\nsize 9\n", says=("Git LFS", "git lfs pull")
     ),
 ]
-INPUTS = SIGNS + UNKNOWN_SIGNS + DIRECTIONS + SIGNS_BESIDE + ORDINARY + LAPLACIANS + ROWS + MATRICES + FORMATS + OTHERS
+
+
+def gml(edge: str) -> str:
+    nodes = 'node [ id 0 label "a" ] node [ id 1 label "b" ]'
+    return f"graph [ directed 1 {nodes} edge [ source 0 target 1 {edge} ] ]"
+
+
+#: The key of another attribute of edges, with the title of the weight.
+SECOND_KEY = '<key id="x" for="edge" attr.name="{}" attr.type="double"/><key id="v" '
+TITLED = '<attributes class="edge"><attribute id="0" title="sign" type="integer"/>'
+#: What libraries and readers of ours took for another number, merged or dropped.
+NUMBERS_AND_ATTRIBUTES = [
+    *(
+        Input("g.gml", gml(f"weight {text}"), f"a>b={weight}")
+        for text, weight in [
+            ("1e-05", "1/100000"),
+            ("-1e-05", "-1/100000"),
+            ("1e+20", "100000000000000000000"),
+            ("1E-05", "1/100000"),
+            (".5", "1/2"),
+            ("5.", "5"),
+            ("+1", "1"),
+            ("1.5E3", "1500"),
+            ("-.5e-3", "-1/2000"),
+            ("5.e1", "50"),
+            ('"1e-05"', "1/100000"),
+            ("1 # 1e-05 1x\n", "1"),
+        ]
+    ),
+    *(Input("g.gml", gml(f"weight {text}"), says=("not a finite number",)) for text in ("INF", "-INF", "NAN", "1e400")),
+    Input("g.gml", gml("weight 1e-400"), says=("outside the range of float64",)),
+    Input("g.gml", gml("weight 1x 2"), says=("line 1", '"1x" is no number')),
+    Input("g.gml", gml('weight 2 note "1x 1e-05"'), "a>b=2"),
+    Input("g.gml", gml("weight 1 weight -1"), says=("edge a -> b", 'two attributes are named "weight" (1 and -1)')),
+    Input("g.gml", gml("weight 1 Weight -1"), says=("edge a -> b", 'two attributes are named "weight" (1 and -1)')),
+    Input("g.gml", gml("weight 2 Weight 2.0"), "a>b=2"),
+    Input("g.gml", gml('weight 2 tag "x" tag "y"'), "a>b=2"),
+    Input("g.gml", gml('weight 2 kind "activates" kind "inhibits"'), says=('named "kind" (activates and inhibits)',)),
+    Input("g.graphml", graphml('<data key="w">2</data><data key="w">-2</data>'), says=('"weight" (2.0 and -2.0)',)),
+    *(
+        Input(
+            "g.graphml",
+            graphml('<data key="w">2</data><data key="x">-2</data>').replace('<key id="v" ', SECOND_KEY.format(title)),
+            says=("edge n0 -> n1", 'two attributes are named "weight" (2.0 and -2.0)'),
+        )
+        for title in ("weight", "Weight")
+    ),
+    Input("g.graphml", graphml('<data key="w">1e-05</data>'), "n0>n1=1/100000"),
+    Input("g.graphml", graphml('<data key="w">1e-400</data>'), says=("outside the range of float64",)),
+    *(
+        Input(
+            "g.graphml",
+            graphml('<data key="w">2</data>').replace('target="n1"', f'target="n1" directed="{told}"'),
+            *is_,
+        )
+        for told, is_ in [
+            ("1", ("n0>n1=2",)),
+            ("true", ("n0>n1=2",)),
+            ("0", ("", ('edge n0 -> n1 has directed="0"', "as two"))),
+            ("no", ("", ('edge n0 -> n1 has directed="no"',))),
+        ]
+    ),
+    Input(
+        "g.graphml",
+        graphml('<data key="w">2</data>').replace('"directed"', '"Directed"'),
+        says=('edgedefault="Directed"; write edgedefault="directed"',),
+    ),
+    Input(
+        "g.graphml",
+        graphml('<data key="w">2</data>').replace(' edgedefault="directed"', ""),
+        says=("no edgedefault; write",),
+    ),
+    Input(
+        "g.json",
+        '[{"source": "a", "target": "b", "weight": 2, "Weight": -2}]',
+        says=("edge a -> b", 'two attributes are named "weight" (2 and -2)'),
+    ),
+    Input(
+        "g.json",
+        '[{"source": "a", "target": "b", "weight": 2, "Weight": -2}]',
+        says=('"weight" (2 and -2)',),
+        how={"columns": "source,target,weight"},
+    ),
+    Input("g.json", '[{"source": "a", "target": "b", "weight": 2, "Weight": 2.0}]', "a>b=2"),
+    *(
+        Input("g.gexf", gexf(edge=f'weight="2" {title}="inhibits"'), "ann>bob=-2")
+        for title in ("label", "kind", "sign")
+    ),
+    Input("g.graphml", graphml('<data key="w">2</data>').replace(' target="n1"', ' target="n1" sign="-1"'), "n0>n1=-2"),
+    Input("g.graphml", graphml("").replace(' target="n1"', ' target="n1" weight="-2"'), "n0>n1=-2"),
+    Input("g.net", NET + '*Arcs\n1 2 2 l "inhibits" c Red\n2 3 1 l activates\n', "ann>bob=-2 bob>eve=1"),
+    Input("g.net", NET + '*Arcs\n1 2 2 l "inhibits"\n2 3 1 c Red\n', says=('"label" holds inhibits', "signs")),
+    Input("g.net", NET + '*Arcs\n1 2 -2 l "a b"\n*Edges\n2 3 1 l "c"\n', "ann>bob=-2 bob>eve=1 eve>bob=1"),
+    *(
+        Input("g.gexf", gexf(edge=edge, values=values).replace(TITLED, f"{TITLED}{more}"), edges, says)
+        for more, edge, values, edges, says in [
+            ("", 'weight="2"', '<attvalue id="0" value="-1"/>', "ann>bob=-2", ()),
+            (
+                '<attribute id="1" title="Weight"/>',
+                'weight="2"',
+                '<attvalue for="1" value="-3"/>',
+                "",
+                ("edge ann -> bob", '"weight" (2 and -3)'),
+            ),
+            ('<attribute id="1" title="Weight"/>', 'weight="2"', '<attvalue for="1" value="2.0"/>', "ann>bob=2", ()),
+            (
+                '<attribute id="1" title="Weight"><default>1</default></attribute>',
+                'weight="2"',
+                "",
+                "ann>bob=2",
+                (),
+            ),
+            (
+                '<attribute id="1" title="Sign"/>',
+                'weight="2"',
+                '<attvalue for="0" value="1"/><attvalue for="1" value="-1"/>',
+                "",
+                ('"sign" (1 and -1)', "keep one"),
+            ),
+            (
+                '<attribute id="1" title="weight"/>',
+                "",
+                '<attvalue for="1" value="2" start="1"/><attvalue for="1" value="-2" start="2"/>',
+                "",
+                ('"weight" (2 and -2)', "keep one"),
+            ),
+            ("", "", '<attvalue for="weight" value="-2"/>', "ann>bob=-2", ()),
+        ]
+    ),
+]
+#: Labels that are not one for each node, fields that are separated otherwise, graphs without edges, small numbers.
+ROWS_AND_MATRICES = [
+    *(
+        Input("g.dl", f"dl n=3 format={layout}\nlabels:\na a b\ndata:\n{rows}\n", says=("same label",))
+        for layout, rows in [
+            ("edgelist1", "1 2 1\n2 1 -1"),
+            ("edgelist1", "1 2 1\n2 3 -1"),
+            ("nodelist1", "1 2\n2 3"),
+            ("fullmatrix", "0 1 0\n0 0 1\n1 0 0"),
+        ]
+    ),
+    *(
+        Input("g.dl", f"dl n=3\n{labels}data:\n0 1 0\n0 0 -2\n5 0 0\n", edges, says)
+        for labels, edges, says in [
+            ("row labels:\na b c\ncolumn labels:\na b c\n", "b>a=1 c>b=-2 a>c=5", ()),
+            ("row labels:\na b c\ncolumn labels:\nc b a\n", "", ("labels of rows and columns differ",)),
+            ("ROW LABELS:\na b c\nCOL LABELS:\nc b a\n", "", ("labels of rows and columns differ",)),
+            ("column labels:\na b c\n", "b>a=1 c>b=-2 a>c=5", ()),
+        ]
+    ),
+    Input("g.dl", "dl n=4 format=edgelist1\nlabels embedded\ndata:\na b 1\nb c -1\n", says=("3 nodes, and n=4",)),
+    Input("g.dl", "dl n=2 format=edgelist1\nlabels embedded\ndata:\na b 1\nb c -1\n", says=("3 nodes, and n=2",)),
+    Input("g.sif", "a\tactivates\tb\nb inhibits c\n", says=("line 2", "one field here", "by tabs")),
+    Input("g.sif", "a activates b\nb,inhibits,c\n", says=("line 2", "one field here", "by blanks")),
+    Input("g.sif", "a\tactivates\tb\n#b c\tinhibits\td\n", says=("line 2", "a row or a comment")),
+    Input("g.sif", "a\tactivates\tb\nprotein kinase C\n", "a>b=1"),
+    *(
+        Input("g.sif", f"b inhibits c\n#a {relation} b\n", says=("line 2", "a row or a comment", '"# "'))
+        for relation in ("activates", "-1", "-")
+    ),
+    *(
+        Input("g.sif", f"{comment}\nb inhibits c\n", "b>c=-1")
+        for comment in ("# a activates b", "#", "##1 - 2", "#source interaction target", "#all of it")
+    ),
+    *(
+        Input("g.mtx", f"%%MatrixMarket matrix {rows}\n", says=("entry -1e-400 is outside the range of float64",))
+        for rows in ("array real general\n2 2\n0\n0.0e5\n-1e-400\n0", "coordinate real general\n2 2 1\n2 1 -1e-400")
+    ),
+    Input("g.mtx", "%%MatrixMarket matrix array real general\n2 2\n0 0.0e5\n-1e-300 -0\n", f"2>1=-1/{10**300}"),
+]
+INPUTS = [
+    *(SIGNS + UNKNOWN_SIGNS + DIRECTIONS + SIGNS_BESIDE + ORDINARY + LAPLACIANS + ROWS + MATRICES + FORMATS + OTHERS),
+    *NUMBERS_AND_ATTRIBUTES,
+    *ROWS_AND_MATRICES,
+]
 
 
 def put(folder: Path, name: str, content: str | bytes) -> Path:
@@ -916,6 +1090,28 @@ LATE = ptcc.LateMessages(delay="0.1")
 def test_arguments_that_are_none_of_what_is_asked_are_refused(call: Any):
     with pytest.raises(ParameterError):
         call(io.StringIO("a,b,1"))
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("g.csv", "a\nb\nc\n"),
+        ("g.csv", "0 0 0\n0 0 0\n0 0 0\n"),
+        ("g.txt", "[0 0 0; 0 0 0; 0 0 0]"),
+        ("g.npy", npy(np.zeros((3, 3)))),
+        ("g.npy", npy(np.zeros((3, 3)), "i8")),
+        ("g.mtx", mtx(np.zeros((3, 3)))),
+        ("g.sif", "a\nb\nc\n"),
+        ("g.dl", "dl n=3\ndata:\n0 0 0\n0 0 0\n0 0 0\n"),
+        ("g.gml", "graph [ directed 1 node [ id 0 ] node [ id 1 ] node [ id 2 ] ]"),
+    ],
+)
+def test_a_graph_without_edges_is_its_own_laplacian(tmp_path, name, content):
+    graph = read_graph(put(tmp_path, name, content), laplacian=True)
+    assert (graph.n_nodes, graph.n_edges) == (3, 0)
+    assert ptcc.as_graph(np.zeros((2, 2)), "listens", laplacian=True).n_edges == 0
+    with pytest.raises(FormatError, match="no Laplacian"):
+        read_graph(put(tmp_path, "g.npy", npy(np.eye(3))), laplacian=True)
 
 
 @pytest.mark.parametrize("command", ["classify", "certify", "simulate", "design", "plot", "check", "batch", "explore"])

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, NoReturn
 
 import numpy as np
 
-from ptcc_certify.errors import FormatError, GraphError
+from ptcc_certify.errors import FormatError, GraphError, NumberError
 from ptcc_certify.graphs.io.columns_beside import column_of
 from ptcc_certify.graphs.io.raw_edges import Beside, Rows, Signs, distinct, rows_of
 from ptcc_certify.graphs.io.signs import family_titles, is_sign, weight_and_sign
-from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.rationals import parse_exact, shorten
 from ptcc_certify.graphs.reading import Reading
 
 Attributes = Mapping[str, Any]
+Pairs = Iterable[tuple[str, Any]]
 
 
 def lower_case(attributes: Attributes) -> dict[str, Any]:
@@ -94,14 +96,44 @@ def _fail(name: str, message: str) -> NoReturn:
 
 
 def attribute_rows(
-    labels: list[str], ends: Sequence[tuple[int, int]], data: Sequence[Attributes], name: str, how: Reading
+    labels: list[str], ends: Sequence[tuple[int, int]], data: Sequence[Pairs], name: str, how: Reading, rest: Pairs = ()
 ) -> Rows:
-    """Turn edges with attributes, which are texts, into rows."""
-    data = [{key: str(value).strip() for key, value in lower_case(one).items()} for one in data]
+    """Turn edges with attributes, which are texts under titles, into rows; ``rest`` is told of edges that say nothing.
+
+    Raises
+    ------
+    FormatError
+        Two attributes of an edge have one title, in small letters, and different values.
+    """
     edge = lambda k: " -> ".join(shorten(labels[end]) for end in ends[k])  # noqa: E731
     told = how.titles[2].lower() if how.titles else None
-    weights, beside = values_of_edges(data, edge, name, told)
+    default = _by_title(rest, told, lambda: f"{name}: the default of edges")
+    where = lambda k: f"{name}: edge {edge(k)}"  # noqa: E731
+    texts = [default | _by_title(one, told, partial(where, k)) for k, one in enumerate(data)]
+    weights, beside = values_of_edges(texts, edge, name, told)
     return rows_of(labels, [one for one, _ in ends], [other for _, other in ends], weights, beside)
+
+
+def _by_title(pairs: Pairs, told: str | None, where: Callable[[], str]) -> dict[str, str]:
+    """Return texts by their titles in small letters; refuse two of one title that differ, if they count."""
+    texts = dict[str, str]()
+    for key, value in pairs:
+        title, text = str(key).lower(), str(value).strip()
+        first = texts.get(title)
+        if first and text and title != "id" and told in (None, title) and not _same(first, text):
+            both = f"{shorten(first)} and {shorten(text)}"
+            raise FormatError(
+                f'{where()}: two attributes are named "{shorten(title)}" ({both}); keep one, or rename it'
+            )
+        texts[title] = text or first or ""
+    return texts
+
+
+def _same(one: str, other: str) -> bool:
+    try:
+        return one == other or parse_exact(one) == parse_exact(other)
+    except NumberError:
+        return False
 
 
 def both_ways(rows: Rows, undirected: Sequence[bool], what: str, how: Reading) -> Rows:

@@ -44,7 +44,7 @@ def read_json(data: bytes, name: str, how: Reading) -> Rows:
         source, target = (_end(one, end, k, labels, number, bool(nodes), name) for end in ("source", "target"))
         ends.append((source, target))
     data_of_links = [
-        {key: str(value) for key, value in one.items() if key not in ("source", "target", "key")} for one in links
+        [(key, value) for key, value in one.items() if key not in ("source", "target", "key")] for one in links
     ]
     rows = attribute_rows(labels, ends, data_of_links, name, how)
     rows.undirected = "" if document.get("directed", True) else '"directed": false'

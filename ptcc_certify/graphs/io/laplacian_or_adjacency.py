@@ -72,6 +72,7 @@ def diagonal_of(first: np.ndarray, second: np.ndarray, entries: np.ndarray, n: i
     >>> diagonal_of(*np.nonzero(L), L[np.nonzero(L)], 2, False).rows
     True
     """
+    first, second = (np.asarray(ends, dtype=np.int64) for ends in (first, second))
     loops = first == second
     off, size = ~loops, np.abs(entries)
 
@@ -86,7 +87,7 @@ def diagonal_of(first: np.ndarray, second: np.ndarray, entries: np.ndarray, n: i
     def equal(total: np.ndarray, magnitude: np.ndarray) -> np.ndarray:
         return np.abs(diagonal - total) <= _ROUNDED * np.maximum(magnitude, np.abs(diagonal))
 
-    some = bool(off.any())
+    some = bool(off.any()) or not loops.any()  # a graph without edges is its own Laplacian
     rows = equal(by_rows, by_rows)
     return Diagonal(
         loops=int(loops.sum()),

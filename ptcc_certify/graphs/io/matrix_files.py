@@ -118,6 +118,10 @@ def read_mtx(data: bytes, name: str, how: Reading) -> Rows:
             announced.append(n * (n + 1) // 2 if half else n * n)
         if announced != [entries.size]:
             raise FormatError(f"{name}: {entries.size} entries, not {announced} as announced; the file is not whole")
+        texts = [text for line in body for text in line.split()] if (zeros := np.flatnonzero(entries == 0)).size else []
+        for text in (texts[len(texts) // entries.size * (k + 1) - 1] for k in zeros.tolist()):
+            if text.lower().partition("e")[0].strip("+-0."):
+                raise FormatError(f"{name}: entry {shorten(text)} is outside the range of float64; rescale the weights")
         if layout == "array":
             source, target = np.triu_indices(n) if half else np.divmod(np.arange(n * n), n)
             source, target, entries = (array[entries != 0] for array in (source, target, entries))

@@ -10,6 +10,7 @@ from typing import TypeVar
 
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io.attributes import both_ways
+from ptcc_certify.graphs.io.columns_beside import column_of
 from ptcc_certify.graphs.io.files import lines_of
 from ptcc_certify.graphs.io.raw_edges import TIMES, Draft, Rows
 from ptcc_certify.graphs.io.text_matrices import is_zero
@@ -67,6 +68,7 @@ def read_pajek(data: bytes, name: str, how: Reading) -> Rows:
     for section in network.sections:
         draft.read(section)
     rows = draft.rows()
+    rows.beside.columns = [column_of("label", draft.tags)] if any(draft.tags) else []
     rows.notes = ("lists without weights: each is 1",) if draft.lists else ()
     timed = any(re.search(r'(^|\s)\[[\d*,\s-]+\](?=[^"]*$)', row) for _, row in network.rows())
     rows.notes += (TIMES,) if timed or network.events else ()
@@ -161,7 +163,7 @@ class _Rows(Draft):
         super().__init__(labels)
         self.labels, self.name = labels, name
         self.n = len(labels)
-        self.undirected, self.lists = list[bool](), False
+        self.undirected, self.tags, self.lists = list[bool](), list[str](), False
 
     def read(self, section: _Section) -> None:
         """Read a section."""
@@ -188,8 +190,10 @@ class _Rows(Draft):
                     )
                 edges = [(int(nodes[0]) - 1, int(other) - 1, weight) for other in nodes[1:]]
                 self.lists = self.lists or lists
+            tag = re.search(r'\sl\s+(?:"([^"]*)"|(\S+))', row)  # the label of an arc, which may be a sign
             for first, second, weight in edges:
                 self.add(first, second, weight, line)
+                self.tags.append("" if tag is None else tag[1] or tag[2] or "")
                 self.undirected.append(undirected)
 
 

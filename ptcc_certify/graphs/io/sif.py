@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
+import re
+
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io.files import lines_of
 from ptcc_certify.graphs.io.raw_edges import Draft, Rows
+from ptcc_certify.graphs.io.signs import sign_of_word
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
 
 
 def read_sif(data: bytes, name: str, how: Reading) -> Rows:
-    """Read SIF; tabs separate the fields where there are any, otherwise blanks; a row with one field is a node."""
+    """Read SIF: fields between tabs where there are any, otherwise blanks; one field is a node, ``# ..`` a comment."""
     lines = lines_of(data, name)
     separator = "\t" if any("\t" in line for line in lines) else None
     draft = Draft()
     for number, line in enumerate(lines, 1):
         fields = [field.strip() for field in line.split(separator)]
-        if not any(fields) or fields[0].startswith("#"):
+        comment = line.lstrip().startswith("#")
+        if (comment or len(fields) == 1) and _is_edge(line, fields):
+            mend = f"separate its fields by {'tabs' if separator else 'blanks'}"
+            what, mend = ("a row or a comment", 'begin a comment with "# "') if comment else ("one field here", mend)
+            raise FormatError(f'{name}, line {number}: "{shorten(line.strip())}" is {what}; {mend}, or rename the node')
+        if not any(fields) or comment:
             continue
         if not all(fields) or len(fields) == 2:
             mend = "write a relation b: one source, one relation, then its targets"
@@ -27,3 +35,11 @@ def read_sif(data: bytes, name: str, how: Reading) -> Rows:
     rows = draft.rows()
     rows.beside.title, rows.columns = "relation", False
     return rows
+
+
+def _is_edge(line: str, fields: list[str]) -> bool:
+    """Tell whether a line reads ``a activates b``, whatever separates its words, and does not begin with ``# ``."""
+    words = fields if len(fields) > 2 else re.split(r"[\s,;]+", line.strip())
+    if len(words) < 3 or words[0][:2] in ("#", "##"):
+        return False
+    return sign_of_word(words[1]) is not None or words[1] in ("1", "+1", "-1")

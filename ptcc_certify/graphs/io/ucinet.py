@@ -14,6 +14,8 @@ from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.graphs.size_limits import MAX_NODES
 
 _FORMATS = ("fullmatrix", "edgelist1", "nodelist1")
+_LABELS = ("labels", "row labels", "column labels", "col labels")
+_DIFFER = "labels of rows and columns differ; give both the same, in the same order"
 _SECTION = re.compile(
     r"\b(labels\s+embedded|(?:(?:row|col|column|matrix)\s+)?labels(?=\s*:)|data(?=\s*:))\s*:?", re.IGNORECASE
 )
@@ -38,8 +40,10 @@ def read_dl(data: bytes, name: str, how: Reading) -> Rows:
         raise FormatError(f"{name}: not one number n of nodes; begin with dl n=3")
     if "data" not in sections:
         raise FormatError(f"{name}: no section data:; write it")
-    own = sections.get("labels", sections.get("row labels"))
-    labels = [] if own is None or embedded else _texts(own)
+    told = [_texts(sections[one]) for one in _LABELS if one in sections and not embedded]
+    if any(one != told[0] for one in told):
+        raise FormatError(f"{name}: {_DIFFER}")
+    labels = told[0] if told else []
     body = [_texts(line) for line in sections["data"].split("\n") if line.strip()]
     dl = _Dl(name, int(n), labels, embedded)
     return dl.matrix(body, settings) if layout == "fullmatrix" else dl.edges(body, layout == "nodelist1")
@@ -56,6 +60,8 @@ class _Dl:
         self.labels = labels or ([] if embedded else [str(i) for i in range(1, n + 1)])
         if not embedded and len(self.labels) != n:
             self.refuse(f"{len(self.labels)} labels for n={n} nodes; give one for each")
+        if len(set(self.labels)) < len(self.labels):
+            self.refuse("two nodes have the same label; rename one")
 
     def refuse(self, message: str) -> NoReturn:
         raise FormatError(f"{self.name}: {message}")
@@ -69,7 +75,7 @@ class _Dl:
             columns, entries = entries[: self.n], entries[self.n :]
             self.labels, step = columns, self.n + 1
             if entries[::step] != columns:
-                self.refuse("labels of rows and columns differ; give both the same, in the same order")
+                self.refuse(_DIFFER)
             entries = [text for k, text in enumerate(entries) if k % step]
         if len(entries) != self.n * self.n:
             self.refuse(f"{len(entries)} entries, not {self.n} x {self.n}; the file is not whole")
@@ -91,7 +97,7 @@ class _Dl:
                 )
             for other in nodes[1:]:
                 draft.add(number[nodes[0]], number[other], "1" if lists else line[2])
-        if len(labels) > self.n:
+        if len(labels) != self.n:
             self.refuse(f"{len(labels)} nodes, and n={self.n}; mend n")
         rows = draft.rows()
         rows.notes = ("lists without weights: each is 1",) if lists else ()
