@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import shutil
 import signal
@@ -23,6 +24,12 @@ settings.register_profile("repeatable", deadline=None, derandomize=True, max_exa
 #: ``--hypothesis-profile thorough``: other examples every time, and many.
 settings.register_profile("thorough", deadline=None, max_examples=1000)
 settings.load_profile("repeatable")
+
+
+def pytest_collection_finish() -> None:
+    """Leave what is loaded, thousands of tests and their modules, to no later search for garbage."""
+    gc.freeze()
+    gc.set_threshold(100_000, 20, 50)
 
 
 @pytest.fixture(scope="session")

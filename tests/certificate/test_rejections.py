@@ -135,6 +135,7 @@ COMMANDS = {
 }
 
 
+@pytest.mark.few(13)
 @pytest.mark.parametrize("options", COMMANDS.values(), ids=COMMANDS)
 @pytest.mark.parametrize("long", [False, True], ids=["short", "long"])
 def test_where_the_check_rejects_nothing_is_claimed_refuted_or_written(options: list[str], long: bool, rejecting: Path):

@@ -181,8 +181,9 @@ def test_every_combination_is_proved_checked_with_and_without_arrays_and_read_ba
         assert one == pytest.approx(other)
 
 
-@pytest.mark.parametrize("name", ["plain", "capped", "late", "late-capped", "lost", "moving", "late-moving"])
+@pytest.mark.few(14)  # two of each
 @pytest.mark.parametrize("seed", range(1, 7))
+@pytest.mark.parametrize("name", ["plain", "capped", "late", "late-capped", "lost", "moving", "late-moving"])
 def test_no_run_exceeds_a_bound(seed: int, name: str):
     certificate = certified(seed, name)
     late, graph, protocol = certificate.late, certificate.graph, certificate.protocol
