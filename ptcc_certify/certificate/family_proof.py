@@ -365,7 +365,7 @@ class FamilyProof(Proof):
     def final_state(self) -> FinalEnds | None:
         """Ends between which each agent is at the deadline, for every signal; None where no limit is claimed.
 
-        By place, or by label: ``final_state["ann"]``.
+        By label, or by place where no label is a number: ``final_state["ann"]``.
         """
         if self.initial_state is None:
             return None
@@ -517,7 +517,9 @@ class FamilyProof(Proof):
     def _undriven(self, part: ComponentProof, functions: Sequence[AnyBoundFunction]) -> UndrivenPart:
         """Return a component with its functions, those of parts that others follow included."""
         rows = HeardRows.of(part.component.family)
-        finals = None if rows is None else self.final_state  # of large families they take long
+        finals = (
+            None if rows is None or self.final_state is None else tuple(self.final_state)
+        )  # of large families they take long
         ends = [] if finals is None else [finals[v] for v in part.component.nodes.tolist()]
         known = [pair for pair in ends if pair is not None]
         everybody = np.arange(part.component.nodes.size)

@@ -193,8 +193,8 @@ def _worst(values: np.ndarray, bounds: np.ndarray) -> float | None:
 
 
 def _final_ratio(certificate: Certificate, run: Trajectory, floor: float) -> float | None:
-    ends = certificate.proof.final_state
-    if run.deadline_index is None or not run.deadline_resolved or ends is None:
+    ends = tuple(certificate.proof.final_state or ())
+    if run.deadline_index is None or not run.deadline_resolved:
         return None
     known = [k for k, interval in enumerate(ends) if interval is not None]
     if not known:

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from fractions import Fraction
+from functools import cached_property
 from typing import Any
 
 from lmi.exact.decimal_rounding import down, up
-from ptcc_certify.graphs.labels import place_of
+from ptcc_certify.graphs.labels import place_of, position
 from ptcc_certify.graphs.rationals import shorten
 
 Interval = tuple[Fraction, Fraction]
 
 
 class FinalEnds(tuple[Interval | None, ...]):
-    """The ends of every agent, in the order of the nodes: a tuple that takes labels beside places.
+    """The ends of every agent, in the order of the nodes: a tuple that takes labels.
 
     Attributes
     ----------
@@ -29,6 +30,8 @@ class FinalEnds(tuple[Interval | None, ...]):
     >>> ends = FinalEnds([(Fraction(6, 5), Fraction(8, 5)), None], ["ann", "bob"])
     >>> ends, ends["ann"] == ends[0]
     (FinalEnds(ann in [1.2, 1.6], bob unknown), True)
+    >>> FinalEnds([None, (Fraction(2), Fraction(2))], ["1", "2"])[2]  # a number is a label where labels are numbers
+    (Fraction(2, 1), Fraction(2, 1))
     """
 
     labels: tuple[str, ...]
@@ -43,9 +46,14 @@ class FinalEnds(tuple[Interval | None, ...]):
         return tuple(self), self.labels
 
     def __getitem__(self, key: Any) -> Any:
-        """Return the ends of an agent, by its place from 0, or by its label if that is a text."""
-        from_end = hasattr(key, "__index__") and -len(self) <= key < 0
-        return super().__getitem__(key if from_end or isinstance(key, slice) else place_of(key, self.labels))
+        """Return the ends of an agent by its label; where no label is a number, by its place, too."""
+        if isinstance(key, slice) or (hasattr(key, "__index__") and -len(self) <= key < 0 and not self._numbered):
+            return super().__getitem__(key)
+        return super().__getitem__((position if self._numbered else place_of)(key, self.labels))
+
+    @cached_property
+    def _numbered(self) -> bool:
+        return any(label.removeprefix("-").isdecimal() for label in self.labels)
 
     def __repr__(self) -> str:
         texts = [f"{shorten(label)} {_text(ends)}" for label, ends in zip(self.labels[:8], self, strict=False)]

@@ -102,7 +102,7 @@ def family_final_facts(certificate: Certificate) -> Facts:
     ends: Sequence[Interval | None] | None = None
     head, more = "x(T)", ""
     if proof.final_state is not None and proof.common:
-        ends, more = proof.final_state, every_text(certificate)
+        ends, more = tuple(proof.final_state), every_text(certificate)
     elif proof.final_state is not None and any(one is not None for one in last_states(certificate.family_proof)):
         ends, more = states_of_signal(certificate.family_proof), f"{agreement_text(certificate)} (these signals)"
         head = "x(T)" if rests(certificate) else "x(t)"

@@ -139,7 +139,7 @@ def _draw_tubes(
     """Shade where the agents of each camp are for every signal; draw the final intervals beyond ``T``, return ends."""
     before = run.remaining > 0
     moves = certificate.proof.deviation_bound(run.remaining[before])
-    finals = certificate.family_proof.final_state or ()
+    finals = tuple(certificate.family_proof.final_state or ())
     largest = np.zeros(len(groups))  # what the states of a component never exceed
     for part in certificate.family_proof.parts:
         nodes = part.component.nodes
