@@ -189,6 +189,7 @@ def run_program(problem: Any, rows: int, tolerance: float, diagonal: bool = Fals
     options["chordal_decomposition_enable"] = rows > _WHOLE_ROWS[diagonal]
     options["chordal_decomposition_merge_method"] = "parent_child"
     options["time_limit"] = seconds_left()
+    options["warm_start"] = False  # nothing depends on what was solved before
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # "solution may be inaccurate": every result is recomputed by the caller
         run_solver(problem, "clarabel", options)
