@@ -383,3 +383,18 @@ def test_leader_groups_moving_leaders_with_a_velocity_and_planes_are_refused():
     with pytest.raises(ParameterError, match="there are two"):
         two = {"messages": LateMessages(delay=1, gain_cap=1), "limits": GainLimits(gain_cap=2)}
         certify(pair, NominalProtocol(), [1, 2], agents=VIRTUAL, **two)
+
+
+@pytest.mark.parametrize("name", ["capped", "plain", "moving"])
+def test_bounds_over_time_are_those_of_the_gain_that_the_tracking_keeps_at_the_deadline(name: str):
+    late = certified(0, name).late
+    T = float(late.gain.gain.T)
+    position, velocity = late.vehicles.over_time(late.case, late.rows, T * np.array([1 - 1e-9, 1, 1.5]))
+    assert late.largest_bound(0.5 * T).shape == (1,) and not np.isnan(velocity).any()
+    if name == "plain":
+        assert np.isinf(velocity[:, 1:]).all() and np.isinf(position[:, 2]).all()
+        return
+    chosen = late.followers
+    assert velocity[chosen, 1] == pytest.approx(velocity[chosen, 0], rel=1e-6)
+    assert (velocity[:, :2] <= late.vehicles.velocity[:, None]).all() and np.isinf(velocity[chosen, 2]).all()
+    assert (position[chosen, 2] <= (position[chosen, 1] if late.leaders is None else late.after)).all()
