@@ -270,6 +270,8 @@ def _states(saved: Certificate) -> tuple[list[str], list[tuple[str, ...]]]:
     numbers = (
         {} if saved.proof.offsets is None else {"$h_{k}$": [texts.rational(saved.proof.offsets[k]) for k in agents]}
     )
+    if (late := saved.proof.late) is not None and (vehicles := late.messages.vehicles) is not None:
+        numbers[r"$\dot x_{k}(0)$"] = [texts.rational(vehicles.v0[k]) for k in agents]
     if saved.initial_state is not None:
         numbers |= texts.state_columns(
             saved, heads, agents, lambda x: texts.enclosed(x) if x[1] else texts.rational(x[0])
