@@ -265,13 +265,11 @@ def _states(saved: Certificate) -> tuple[list[str], list[tuple[str, ...]]]:
     """Return heads and rows of the table of places in a formation, and of initial and final states."""
     if (saved.initial_state is None and saved.proof.offsets is None) or saved.proof.agents is not None:
         return [], []
-    heads = ("$x_{k}(0)$", r"$\sigma_{k}(0)$", "at the deadline", "limit, if it settles")
+    heads = ("$x_{k}(0)$", r"$\dot x_{k}(0)$", r"$\sigma_{k}(0)$", "at the deadline", "limit, if it settles")
     agents = range(min(saved.graph_proof.graph.n_nodes, texts.LISTED))
     numbers = (
         {} if saved.proof.offsets is None else {"$h_{k}$": [texts.rational(saved.proof.offsets[k]) for k in agents]}
     )
-    if (late := saved.proof.late) is not None and (vehicles := late.messages.vehicles) is not None:
-        numbers[r"$\dot x_{k}(0)$"] = [texts.rational(vehicles.v0[k]) for k in agents]
     if saved.initial_state is not None:
         numbers |= texts.state_columns(
             saved, heads, agents, lambda x: texts.enclosed(x) if x[1] else texts.rational(x[0])
@@ -289,6 +287,8 @@ def _family_states(saved: Certificate) -> tuple[list[str], list[tuple[str, ...]]
     labels, camps, begins, ends = zip(*rows, strict=True)
     columns = {"Camp": [Markup("--") if camp == "\N{EN DASH}" else camp for camp in camps]}
     columns["$x_{k}(0)$"] = _in_math(begins)
+    if (v0 := saved.proof.velocities) is not None:
+        columns[r"$\dot x_{k}(0)$"] = _in_math(map(texts.rational, v0[: texts.LISTED]))
     if not saved.direct:
         columns[r"$\sigma_{k}(0)$"] = _in_math(map(texts.rational, (saved.sigma0 or ())[: texts.LISTED]))
     if any(end is not None for end in ends):
