@@ -845,7 +845,16 @@ def test_a_rate_of_a_family_is_told_where_the_check_accepts_it_though_not_all_is
     cert = certify(SignedDigraph.from_edges(edges), NominalProtocol(), uncertainty="10%", messages=LateMessages("0.01"))
     assert cert.checked is not None and not cert.refused
     unchecked = replace(cert.checked, verdict="undecided")
-    cert.__dict__["_recorded"] = (*cert._recorded[:2], unchecked)
+    cert.__dict__["checked"] = unchecked
     assert cert.verdict == "undecided" and not cert.refused
-    cert.__dict__["_recorded"] = (*cert._recorded[:2], replace(unchecked, accepted=False))
+    cert.__dict__["checked"] = replace(unchecked, accepted=False)
     assert cert.refused
+
+
+def test_vehicles_that_begin_on_their_targets_with_velocities_are_judged_by_the_way_on_which_they_brake():
+    Path("pair.csv").write_text("source,target,weight\na,b,1\nb,c,-1\n")
+    words = ("--x0", "2,2,-2", "--agents", "double-integrator", "--exchange", "virtual", "--gain-cap", "200")
+    fast = ptcc("certify", "pair.csv", *words, "--rho2", "3", "--v0", "0,3,-1").out
+    assert "says little" not in fast
+    slow = ptcc("certify", "pair.csv", *words, "--rho2", "0.1", "--v0", "0,3,-1").out
+    assert "says little" in slow
