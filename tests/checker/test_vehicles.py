@@ -33,7 +33,7 @@ from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.virtual_positions import TrackingProtocol
 from ptcc_certify.simulation.late_messages import simulate_late
 from ptcc_certify.simulation.run import simulate
-from ptcc_certify.simulation.virtual_positions import follow, simulate_vehicles
+from ptcc_certify.simulation.virtual_positions import follow, run_virtual_positions, simulate_vehicles
 
 F = Fraction
 VIRTUAL = Agents(order=2, exchange="virtual")
@@ -398,3 +398,16 @@ def test_bounds_over_time_are_those_of_the_gain_that_the_tracking_keeps_at_the_d
     assert velocity[chosen, 1] == pytest.approx(velocity[chosen, 0], rel=1e-6)
     assert (velocity[:, :2] <= late.vehicles.velocity[:, None]).all() and np.isinf(velocity[chosen, 2]).all()
     assert (position[chosen, 2] <= (position[chosen, 1] if late.leaders is None else late.after)).all()
+
+
+@pytest.mark.parametrize("parts", [{"limits": GainLimits(gain_cap=5)}, {"messages": LateMessages("0.1", gain_cap=5)}])
+def test_the_input_at_the_deadline_is_that_just_before_it(parts: dict[str, Any]):
+    graph, protocol = SignedDigraph.from_edges([(1, 2, 1), (2, 3, 1)]), NominalProtocol(T=1, rho1="0.1", rho2=1)
+    asks = Asks(simulation=False)
+    late = certify(graph, protocol, InitialState([0, 5, -5], v0=[0, 1, 0]), agents=VIRTUAL, asks=asks, **parts).late
+    virtual = run_virtual_positions(graph, protocol, late.messages, [0, 5, -5])
+    run = follow(virtual, late.tracking_protocol, late.messages.vehicles.v0)
+    end = int(np.argmax(run.remaining == 0))
+    near = int(np.flatnonzero(run.remaining > 1e-5)[-1])
+    assert np.abs(run.held_input[:, near]).max() > 0.1
+    assert run.held_input[:, end] == pytest.approx(run.held_input[:, near], abs=1e-2)
