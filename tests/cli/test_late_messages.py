@@ -858,3 +858,11 @@ def test_vehicles_that_begin_on_their_targets_with_velocities_are_judged_by_the_
     assert "says little" not in fast
     slow = ptcc("certify", "pair.csv", *words, "--rho2", "0.1", "--v0", "0,3,-1").out
     assert "says little" in slow
+
+
+def test_a_saved_certificate_says_that_information_arrives_too_late_for_stages():
+    Path("pair.csv").write_text("source,target,weight\na,b,1\nb,c,-1\nc,d,1\n")
+    made = ptcc("certify", "pair.csv", "--delay", "0.6", "--x0", "1,2,3,4", "--no-simulation", "-o", "c.json")
+    assert made.code == 0 and "no deadlines of stages" in made.out
+    read = read_certificate("c.json")
+    assert read.late is not None and read.late.unarrived and "no deadlines of stages" in read.summary()

@@ -289,10 +289,17 @@ def bound_late(case: LateCase) -> LateBounds:
     bounds = replace(bounds, rows=found, steps=steps, residual=_least(rows, each), input=_least(rows, inputs))
     if messages.vehicles is not None:
         return replace(bounds, vehicles=bound_vehicles(case, found, rows))
-    if not of_graph or messages.value_error or messages.gain_cap is not None or case.leaders is not None:
+    if not _may_be_staged(case):
         return bounds
     missed = find_missed(case, rows.followers.tolist())
     return replace(bounds, missed=missed, staged=stage_deadlines(rows, case.protocol.T, messages.age))
+
+
+def _may_be_staged(case: LateCase) -> bool:
+    """Tell whether late messages of a graph are all that keeps followers of single leaders from settling exactly."""
+    told = case.messages
+    alone = not (told.own_delay or told.value_error or told.gain_cap is not None or told.vehicles or case.leaders)
+    return alone and isinstance(case.structure, Structure) and not case.groups
 
 
 def late_rows(case: LateCase) -> FollowerRows:
@@ -377,13 +384,16 @@ def read_late(
     if section.steps is not None:
         start = floats(proved["late-steps", "messages.steps"]["witness"].start)
         steps = bound_steps(case, late_rows(case), tuple(section.steps.instants), start)
+    staged = None if section.staged is None else tuple(section.staged)
+    if staged is None and _may_be_staged(case) and stage_deadlines(late_rows(case), protocol.T, messages.age) == ():
+        staged = ()  # which files leave out
     return LateBounds(
         case,
         relative,
         rows=tuple(rows),
         steps=steps,
         missed=missed,
-        staged=None if section.staged is None else tuple(section.staged),
+        staged=staged,
         residual=floats_up(section.residual),
         form=_of_whole_graph(SmallDelays, section.form, proved.get(("late-form", "messages.form"))),
         lmi=_of_whole_graph(DelayLMIBound, section.lmi, proved.get(("late-lmi", "messages.lmi"))),
