@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -63,6 +64,22 @@ def clock_values(clock: Any, name: str = "clock") -> np.ndarray:
     array(inf)
     """
     return _within(clock, name, math.inf, "a clock is 0 at the start and infinite at its deadline")
+
+
+def instants_from_0(t: Any, name: str = "t") -> np.ndarray:
+    """Return instants as an array of floats, one number as an array of one; or refuse what is none from 0 on.
+
+    Raises
+    ------
+    ParameterError
+        A value is negative, infinite or not a number.
+
+    Examples
+    --------
+    >>> instants_from_0(0.5)
+    array([0.5])
+    """
+    return np.atleast_1d(_within(t, name, sys.float_info.max, "instants are from 0 on"))
 
 
 def _within(values: Any, name: str, most: float, domain: str) -> np.ndarray:

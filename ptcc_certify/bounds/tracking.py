@@ -19,6 +19,7 @@ import numpy as np
 
 from lmi.errors import LMIError, NoCertificate
 from lmi.exact.decimal_rounding import float_up, up
+from ptcc_certify.bounds.envelope import remaining_part
 from ptcc_certify.bounds.float_conversion import floats, floats_up
 from ptcc_certify.checker.leaders import LeadersAsked, LeadersSection
 from ptcc_certify.checker.obligations import CheckReport
@@ -93,8 +94,16 @@ class Tracking:
         return float(self.after) * float(self.witness.u.max()) * _MORE
 
     def distance_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Return what bounds ``|x_k - x_k*|`` of followers where ``1 - t/T`` is ``remaining``, ``(F, M)`` floats."""
-        q, T = np.asarray(remaining, dtype=float), float(self.protocol.T)
+        """Return what bounds ``|x_k - x_k*|`` of followers where ``1 - t/T`` is ``remaining``, ``(F, M)`` floats.
+
+        One number counts as an array of one; from ``T`` on :attr:`distance_after` bounds it.
+
+        Raises
+        ------
+        ParameterError
+            An instant is not from 0 to 1.
+        """
+        q, T = np.atleast_1d(remaining_part(remaining)), float(self.protocol.T)
         with np.errstate(divide="ignore", invalid="ignore"):
             clock = self.protocol.gain.clock_at_remaining(q)
         m = np.exp(-float(self.witness.b) * clock) * float(self.initial) + self.drift * T * _decayed(q, self.pole)

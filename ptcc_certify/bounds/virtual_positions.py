@@ -60,11 +60,14 @@ class VehicleBounds:
     input: np.ndarray | None
 
     def over_time(self, case: LateCase, rows: Sequence[RowBound], t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return what bounds positions and velocities of all agents at instants up to ``T``, ``(N, M)`` floats."""
-        chosen, a1 = case.followers, float(self.a1)
+        """Return what bounds deviations and velocities of all agents at instants, ``(N, M)`` floats.
+
+        From ``T`` on the gain of the tracking stays what it came to: without a cap there is no bound after ``T``. With
+        one there is none of velocities then, of deviations the same, but :meth:`after` where leaders move.
+        """
+        chosen, a1, T, cap = case.followers, float(self.a1), float(case.protocol.T), case.messages.gain_cap
         speed = np.array([float(abs(x)) for x in self.v0])[:, None]
-        with np.errstate(divide="ignore"):  # without a cap the gain is infinite at T
-            g = case.limited().value(t)
+        g = case.limited().value(t, remaining=np.maximum(1 - t / T, _LEAST))
         first = float(case.exact.least_gain())
         position, velocity = (np.full((speed.size, len(t)), np.inf) for _ in range(2))
         for row in filter(self._tracks, rows):
@@ -74,10 +77,16 @@ class VehicleBounds:
             decaying = float(row.initial) * y + added
             own = u * (a1 * lag * decaying + floor) + speed * lag / first * y
             ahead = u * (decaying + floor) + speed / (a1 * first) * y
-            least = np.where(decaying + floor > 0, _LEAST, 0.0)
+            least = np.where((u + speed > 0) & (decaying + floor > 0), _LEAST, 0.0)
             position = np.minimum(position, own * _MORE + least)
-            with np.errstate(invalid="ignore"):
-                velocity = np.minimum(velocity, a1 * g * (own + ahead) * _MORE + least)
+            velocity = np.minimum(velocity, a1 * g * (own + ahead) * _MORE + least)
+        past = t > T
+        if self.velocity is None:
+            velocity[:, t >= T] = np.inf
+        else:
+            velocity = np.where(past, np.inf, np.minimum(velocity, self.velocity[:, None]))
+        if cap is None or case.leaders is not None:
+            position[:, past] = np.inf if (after := self.after(case, rows)) is None else after
         if case.leaders is not None:  # which move as they like
             others = np.setdiff1d(np.arange(speed.size), chosen)
             position[others] = velocity[others] = 0

@@ -23,6 +23,7 @@ from ptcc_certify.bounds.agents.each_agent import (
 )
 from ptcc_certify.bounds.agents.halved_times import instant_values
 from ptcc_certify.bounds.agents.run_against_bounds import AgentsComparison, compare_agents
+from ptcc_certify.bounds.envelope import remaining_part
 from ptcc_certify.bounds.final_state.enclosed_ends import agents_ends
 from ptcc_certify.bounds.final_state.of_graph import Influence
 from ptcc_certify.bounds.float_conversion import numbers
@@ -152,7 +153,7 @@ class AgentsPart(AgentsAnswer):
 
         Infinite where nothing is proved, or without an initial state.
         """
-        q = np.atleast_1d(np.asarray(remaining, dtype=float))
+        q = np.atleast_1d(remaining_part(remaining))
         bounds = np.full((self.structure.graph.n_nodes, self.order, len(q)), np.inf)
         powers = np.outer(np.arange(self.order), np.log([self.protocol.value(x) for x in q]))
         known = list(enumerate((self.initial_values, *self.instants))) if self.initial_values else []

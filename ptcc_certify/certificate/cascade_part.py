@@ -14,6 +14,7 @@ from ptcc_certify.bounds.agents.common_motion import LARGEST_DECAY, common_motio
 from ptcc_certify.bounds.agents.each_agent import States, root_product
 from ptcc_certify.bounds.agents.halved_times import Values, instant_roots
 from ptcc_certify.bounds.agents.run_against_bounds import AgentsComparison, compare_with_bounds
+from ptcc_certify.bounds.envelope import remaining_part
 from ptcc_certify.bounds.float_conversion import numbers
 from ptcc_certify.certificate.agents_answer import AgentsAnswer, final_states, read, rows_of, use, written
 from ptcc_certify.certificate.graph_proof import GraphProof
@@ -203,9 +204,9 @@ class CascadePart(AgentsAnswer):
         and what the course of ``r`` tells, by each function. Infinite where nothing is proved, or without an initial
         state.
         """
+        q = np.atleast_1d(remaining_part(remaining))
         if not self.roots:
-            return np.full((self.structure.graph.n_nodes, 2, len(np.atleast_1d(remaining))), np.inf)
-        q = np.atleast_1d(np.asarray(remaining, dtype=float))
+            return np.full((self.structure.graph.n_nodes, 2, len(q)), np.inf)
         N, gain = self.structure.graph.n_nodes, self.protocol.gain
         near, fast, errors, drive, integral, begin = (np.full((N, len(q)), np.inf) for _ in range(6))
         fading = np.exp(-float_down(self.alpha) * gain.clock_at_remaining(q))

@@ -66,16 +66,17 @@ class Certificate(Recorded):
     def refused(self) -> bool:
         """Whether the check does not accept functions that were found of a family: what follows of them is not told."""
         parts = self.proof.parts if isinstance(self.proof, FamilyProof) else ()
-        return self.verdict != "certified" and any(part.functions for part in parts)
+        accepted = self.checked is not None and self.checked.accepted
+        return not accepted and any(part.functions for part in parts)
 
     def to_pandas(self) -> pd.DataFrame:
         """Return one row per agent: where it begins and ends, and how near its end it is proved.
 
         Of one graph ``role``, ``group``, ``camp`` and ``component`` are those of :meth:`Structure.to_pandas`; ``x(0)``
         and ``x(T)`` are rounded to floats; ``deviation`` bounds ``|x_k - x_k(T)|`` at 0.99 T, or at T_r + 0.99 T_s,
-        with nothing late and leaders at rest, of virtual positions where these are exchanged. The last three are NaN
-        where the certificate has no initial state, or nothing is proved. Of agents of order n there are columns for
-        each derivative and coordinate, such as ``v_2(T)``, and the proved bound of the input.
+        with nothing late, leaders at rest and no cap of the gain, of virtual positions where these are exchanged. The
+        last three are NaN where the certificate has no initial state, or nothing is proved. Of agents of order n there
+        are columns for each derivative and coordinate, such as ``v_2(T)``, and the proved bound of the input.
 
         Of a family ends are rounded outwards to floats, and NaN where nothing is proved; they are those with nothing
         late and leaders at rest, also where more was asked.

@@ -231,7 +231,9 @@ def judge_rate_beside(proof: GraphProof | FamilyProof, least: Fraction, what: st
     if proof.asked_messages is None or (late is not None and late.direct):
         return None
     if late is None or late.lmi is None:
-        return Answer(OPEN, what, "no rate is proved with late messages")
+        vehicles = proof.velocities is not None and proof.asked_messages.exact
+        whose = "of vehicles that exchange virtual positions" if vehicles else "with late messages"
+        return Answer(OPEN, what, f"no rate is proved {whose}")
     rate = 2 * late.lmi.b
     return Answer(MET if rate >= least else OPEN, what, f"with late messages {down(rate)} is proved")
 

@@ -166,3 +166,9 @@ class Proof(OfQuestion):
         """How leaders move."""
         proved = (one.leaders for one in (self.late, self.tracking) if one is not None and one.leaders is not None)
         return next(proved, self.request.leaders)
+
+    @property
+    def velocities(self) -> Sequence[Fraction] | None:
+        """Initial velocities of vehicles that exchange virtual positions; None without them."""
+        vehicles = None if self.late is None else self.late.messages.vehicles
+        return None if vehicles is None else vehicles.v0

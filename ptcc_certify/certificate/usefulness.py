@@ -241,6 +241,8 @@ def _use_of_late(late: LateBounds, longest_way: float | None) -> Use:
     if late.largest <= _NOTHING:
         return Use(True, "", caveat)
     way = 1.0 if late.relative else longest_way
+    if way is not None and (vehicles := late.vehicles) is not None:  # the way on which they brake, beside that to go
+        way += float(max(map(abs, vehicles.v0)) / (vehicles.a1 * late.case.exact.least_gain()))
     where = "agent within {} of its final state" if late.leaders is None else "follower within {} of its target"
     remark = f"every {where.format(up(late.largest, 2))} at T{' from within 1 of it' if late.relative else ''}"
     return Use(way is not None and late.largest <= USEFUL * way, remark, caveat)

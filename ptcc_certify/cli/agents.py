@@ -192,7 +192,7 @@ def _refuse_unproved(options: Options, certified: bool) -> None:
     if exchanges_virtual(options):
         raise ParameterError(
             "--exchange: of vehicles that exchange virtual positions this is not built yet; "
-            "ptcc certify takes one coordinate at a time; or leave it out"
+            "ptcc certify -o c.json takes one coordinate at a time, ptcc plot c.json draws that; or leave it out"
         )
     given = [name for name in _OF_SINGLE_INTEGRATORS if options.get(name) is not None]
     if given:

@@ -11,6 +11,7 @@ import click
 from lmi.exact.decimal_rounding import down
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.agents import (
+    NAMES,
     agents_and_states,
     agents_options,
     dimension_option,
@@ -155,8 +156,8 @@ def _origins(options: shared.Options) -> dict[str, str]:
     """Return which of ``x(0)`` and ``sigma(0)`` were drawn, and with which seed."""
     states = {"x(0)": options["x0"], "sigma(0)": options["sigma0"], "v(0)": options["v0"], "a(0)": options["a0"]}
     drawn = {name: f"random, seed {options['seed']}" for name, text in states.items() if text == "random"}
-    zero = {name: "0" for name in ("v(0)", "a(0)") if states[name] in (None, "0")}
-    return drawn | (zero if options["agents"] is not None else {})
+    moved = ("v(0)", "a(0)")[: NAMES.get(options["agents"], 1) - 1]
+    return drawn | {name: "0" for name in moved if states[name] in (None, "0")}
 
 
 def _log_result(certificate: Certificate) -> None:

@@ -183,6 +183,8 @@ def refuse_beside(structure: Structure, case: Case) -> None:
         _refuse_messages(structure, messages, [limit.gain_cap for limit in case.limits])
     if structure.graph.n_edges == 0:
         name, why = ("leaders", "nobody tracks") if messages is None else ("messages", "nothing is late")
+        if messages is not None and messages.vehicles is not None and messages.exact:
+            name, why = "exchange", "no virtual positions are exchanged"
         raise ParameterError(name, f"nobody listens to anybody, so {why}; leave it out")
 
 

@@ -32,14 +32,14 @@ TITLE = "Robust prescribed-time coordination control of cooperative-antagonistic
 
 #: What facts are of, in words, by their heads.
 HEADS = {"nodes": "Their names", "read": "Read as", "family": "Family of graphs", "given": "Assumed"}
-HEADS |= {"x(0)": "Initial state", "sigma(0)": "Sliding variables sigma(0)", "claim": "What they do"}
+HEADS |= {"x(0)": "Initial state", "v(0)": "Initial velocities", "sigma(0)": "Sliding variables sigma(0)"}
 HEADS |= {"alone": "Each mode alone", "groups": "What holds all the same", "box": "Where they are drawn"}
 HEADS |= {"rate": "How fast", "error": "How near", "bound": "Upper bound", "function": "Lyapunov functions"}
 HEADS |= {"x(T)": "Where they end", "v(T)": "Velocities at T", "a(T)": "Accelerations at T", "x(t)": "Where they stay"}
 HEADS |= {"messages": "Late messages", "late": "Left by then", "left": "Left"}
 HEADS |= {"tracking": "How leaders are tracked", "disturbed": "Disturbances", "limited": "Within limits"}
 HEADS |= dict.fromkeys(("constant", "dwell", "shares", "windows"), "If signals are restricted")
-HEADS |= {"effort": "Size of the input"}
+HEADS |= {"effort": "Size of the input", "claim": "What they do"}
 
 _MINUS = "\N{MINUS SIGN}"
 #: Units of a formula's drawing in the size of its letters.
@@ -280,20 +280,22 @@ def agent_parts(saved: Certificate) -> list[str]:
 
 def state_columns(
     saved: Certificate,
-    heads: tuple[str, str, str, str],
+    heads: tuple[str, str, str, str, str],
     agents: Sequence[int],
     written: Callable[[tuple[Fraction, Fraction]], str],
 ) -> dict[str, list[str]]:
-    """Return initial state, ``sigma(0)`` and final state of agents, as far as there are, by their heads.
+    """Return initial states, ``v(0)`` of vehicles, ``sigma(0)`` and final states, as far as there are, by their heads.
 
     The last head is for what an undecided certificate says of the final state; ``written`` writes a proved interval.
     """
     x0, sigma0, end = saved.proof.initial_positions or (), saved.sigma0 or (), saved.graph_proof.final_positions
     columns = {heads[0]: [rational(x0[k]) for k in agents]}
+    if (v0 := saved.proof.velocities) is not None:
+        columns[heads[1]] = [rational(v0[k]) for k in agents]
     if not saved.direct:
-        columns[heads[1]] = [rational(sigma0[k]) for k in agents]
+        columns[heads[2]] = [rational(sigma0[k]) for k in agents]
     if end is not None and (intervals := end.intervals):
-        ends = heads[2] if saved.verdict == "certified" else heads[3]
+        ends = heads[3] if saved.verdict == "certified" else heads[4]
         columns[ends] = [written(intervals[k]) for k in agents]
     return columns
 

@@ -68,7 +68,7 @@ def _tabled(saved: Certificate) -> list[int]:
 def _of_graph(saved: Certificate) -> dict[str, list[Any]]:
     if saved.initial_state is None:
         return {}
-    heads = ("Initial state", "\u03c3(0)", "State at the deadline", "Limit, if it settles")
+    heads = ("Initial state", "Initial velocity", "\u03c3(0)", "State at the deadline", "Limit, if it settles")
     agents, parts = _tabled(saved), texts.agent_parts(saved)
     columns: dict[str, list[Any]] = {"Part": [parts[k] for k in agents]}
     if saved.proof.offsets is not None:
@@ -100,8 +100,12 @@ def _vector(numbers: Sequence[float]) -> str:
 
 
 def _of_family(saved: Certificate) -> tuple[str, list[Any], list[str]]:
-    rows, finals = state_rows(saved)[:ROWS], states_of_signal(saved.family_proof)
+    rows: list[tuple[Any, ...]] = list(state_rows(saved)[:ROWS])
+    finals = states_of_signal(saved.family_proof)
     heads = ["Agent", "Camp", "Initial state"]
+    if (v0 := saved.proof.velocities) is not None:
+        heads.append("Initial velocity")
+        rows = [(*begin, rational(v), end) for (*begin, end), v in zip(rows, v0, strict=False)]
     if all(last is None for *_, last in rows):
         return "Where the agents begin", [(texts.label(name), *cells) for name, *cells, _ in rows], heads
     every = finals == list(saved.proof.final_state or ())
@@ -109,7 +113,7 @@ def _of_family(saved: Certificate) -> tuple[str, list[Any], list[str]]:
     which += "" if saved.protocol.reaching is None else " and disturbance"
     last = "State at the deadline" if rests(saved) else "State at any instant"
     caption = f"Where the agents end{_assumed(saved)}, proved for {which if every else 'signals that keep the promise'}"
-    written = [(texts.label(name), camp, first, end or _ends(None)) for name, camp, first, end in rows]
+    written = [(texts.label(name), *cells, end or _ends(None)) for name, *cells, end in rows]
     return caption, written, [*heads, f"{last}{agreement_text(saved)}, for {which}"]
 
 

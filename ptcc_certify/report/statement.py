@@ -265,7 +265,7 @@ def _states(saved: Certificate) -> tuple[list[str], list[tuple[str, ...]]]:
     """Return heads and rows of the table of places in a formation, and of initial and final states."""
     if (saved.initial_state is None and saved.proof.offsets is None) or saved.proof.agents is not None:
         return [], []
-    heads = ("$x_{k}(0)$", r"$\sigma_{k}(0)$", "at the deadline", "limit, if it settles")
+    heads = ("$x_{k}(0)$", r"$\dot x_{k}(0)$", r"$\sigma_{k}(0)$", "at the deadline", "limit, if it settles")
     agents = range(min(saved.graph_proof.graph.n_nodes, texts.LISTED))
     numbers = (
         {} if saved.proof.offsets is None else {"$h_{k}$": [texts.rational(saved.proof.offsets[k]) for k in agents]}
@@ -287,6 +287,8 @@ def _family_states(saved: Certificate) -> tuple[list[str], list[tuple[str, ...]]
     labels, camps, begins, ends = zip(*rows, strict=True)
     columns = {"Camp": [Markup("--") if camp == "\N{EN DASH}" else camp for camp in camps]}
     columns["$x_{k}(0)$"] = _in_math(begins)
+    if (v0 := saved.proof.velocities) is not None:
+        columns[r"$\dot x_{k}(0)$"] = _in_math(map(texts.rational, v0[: texts.LISTED]))
     if not saved.direct:
         columns[r"$\sigma_{k}(0)$"] = _in_math(map(texts.rational, (saved.sigma0 or ())[: texts.LISTED]))
     if any(end is not None for end in ends):

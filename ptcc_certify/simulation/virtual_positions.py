@@ -170,8 +170,10 @@ def _followed(
     a1, a2, z, s = float(protocol.a1), float(protocol.a2), run.states, run.clock
     gain = GainLimits(gain_cap=protocol.gain_cap).limit(protocol.gain)
     g = gain.value(run.t, remaining=run.remaining)
-    if protocol.gain_cap is not None:
-        g = np.maximum.accumulate(g)
+    pulled = run.input
+    if protocol.gain_cap is not None:  # at T as just before it, where z is still drawn with the gain it came to
+        acts, g = g, np.maximum.accumulate(g)
+        pulled = np.where(run.t == float(protocol.gain.T), pulled * g / acts, pulled)
     begun = np.array([float(x) for x in v0])[:, None]
     with np.errstate(invalid="ignore", over="ignore"):
         r = begun * np.exp(-a2 * s)
@@ -184,7 +186,7 @@ def _followed(
             lag = (x[:, i] - z[:, i]) * left - (z[:, i + 1] - z[:, i]) * mean
             x[:, i + 1] = z[:, i + 1] + lag + kept * (ahead[:, i] + ahead[:, i + 1]) / (2 * a1)
         v = r - a1 * g * (x - z)
-        u = -a1 * _slope(protocol, g) * (x - z) - a1 * g * (v - run.input) - a2 * g * r
+        u = -a1 * _slope(protocol, g) * (x - z) - a1 * g * (v - pulled) - a2 * g * r
     seen = np.isfinite(u) & ((run.remaining > _NEAREST) | (protocol.gain_cap is not None))
     u, v = np.where(seen, u, np.nan), np.where(seen, v, np.nan)
     if run.targets is not None:  # leaders that move as they like send their own positions

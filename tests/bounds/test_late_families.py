@@ -382,7 +382,9 @@ def test_page_and_latex_tell_no_end_of_another_problem(name: str, tmp_path: Path
     made = certified(name)
     made.save(tmp_path / "c.json")
     saved = ptcc.read_certificate(tmp_path / "c.json")
-    without = ", ".join(["nothing late"] * (made.late is not None) + ["leaders at rest"] * made.leaders_move)
+    capped = made.late is not None and made.late.messages.gain_cap is not None
+    absent = {"without a gain cap": capped, "nothing late": made.late is not None, "leaders at rest": made.leaders_move}
+    without = ", ".join(text for text, there in absent.items() if there)
     page = report_html(saved)
     assert f"Where the agents end, {without}, proved for every signal" in page
     assert "numerical), under the proved bound" not in page and "at most: the proved bound for every signal" in page

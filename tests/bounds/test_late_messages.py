@@ -796,3 +796,44 @@ def test_rows_that_floats_do_not_resolve_leave_what_is_late_unproved(delay: obje
     messages = LateMessages(delay=delay, value_error="0.1", gain_cap=5)
     bounds = bound_late(LateCase(structure, NominalProtocol(T=1, rho1=1, rho2=4, kappa=1), messages))
     assert bounds.rows == () and bounds.steps is None and not bounds.says_something
+
+
+@pytest.mark.parametrize("cap", [None, 20])
+def test_after_T_the_bound_is_what_holds_there(cap: int | None) -> None:
+    """``b' = -rho1 (b - a(t - delay))`` lags behind ``a' = 1`` ever more after ``T``, up to ``1/rho1`` and a delay."""
+    graph, protocol = SignedDigraph.from_edges([("a", "b", 1)]), NominalProtocol(T=1, rho1="0.1", rho2=2, kappa=1)
+    messages, leaders = LateMessages("0.01", gain_cap=cap), MovingLeaders(speed=1)
+    asks = Asks(simulation=False)
+    late = certify(graph, protocol, [0, 5], messages=messages, leaders=leaders, asks=asks).late
+    assert late is not None and late.after is not None
+    times = np.array([1.1, 2, 5, 60])
+    lag = 0.01 + 10 * (1 - np.exp(-(times - 1) / 10))  # from no more than the delay at T
+    bound = late.deviation_bound(times)[0]
+    assert np.all(lag - 0.011 <= bound) and np.all(bound <= late.after)
+    assert np.all(late.largest_bound(times) == bound)
+    at_rest = certify(graph, protocol, [0, 5], messages=messages, asks=asks).late
+    assert at_rest is not None and at_rest.deviation_bound(3).max() <= at_rest.largest < math.inf
+
+
+@pytest.mark.parametrize("leaders", [None, MovingLeaders("0.2")])
+def test_bounds_from_instant_to_instant_are_kept_after_T_unless_leaders_move(leaders: MovingLeaders | None) -> None:
+    structure = analyse(SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1)]))
+    state, ends = [Fraction(x) for x in (0, 5, 1)], [(Fraction(0), Fraction(0))] * 3
+    steps = bound_late(LateCase(structure, NominalProtocol(), LateMessages("0.01"), state, ends, leaders)).steps
+    case = LateCase(structure, NominalProtocol(), LateMessages("0.01"), state, ends, leaders)
+    assert steps is not None and np.isfinite(steps.deviation_bound(case, np.array([1.0]))).all()
+    assert np.isfinite(steps.deviation_bound(case, np.array([1.5]))).all() == (leaders is None)
+
+
+@pytest.mark.parametrize("t", [-0.1, math.nan, math.inf, [0.5, -1], "x"])
+def test_instants_before_0_or_none_are_refused(t: Any) -> None:
+    structure = analyse(SignedDigraph.from_edges([("a", "b", 1)]))
+    bounds = bound_late(LateCase(structure, NominalProtocol(), LateMessages("0.01")))
+    assert bounds.deviation_bound(0.5).shape == (1, 1) and bounds.largest_bound(0.5).shape == (1,)
+    for ask in (bounds.deviation_bound, bounds.largest_bound):
+        with pytest.raises(ParameterError, match=r"^t "):
+            ask(t)
+    tracking = bound_tracking(structure, NominalProtocol(), MovingLeaders(1))
+    assert tracking.distance_bound(0.5).shape == (1, 1)
+    with pytest.raises(ParameterError, match=r"^remaining"):
+        tracking.distance_bound(-0.5)

@@ -499,3 +499,13 @@ def test_eigenvalues_that_lie_far_apart_do_not_loosen_bounds_of_the_cascade():
     seen = np.abs(run.scaled[:, 0, :, m]).max(axis=0) * [1, eta] * np.exp(-run.rate * run.clock[m] / 2)
     bound = part.deviation_bound(run.remaining[[m]])[:, :, 0].max(axis=0)
     assert (seen <= bound * (1 + 1e-7)).all() and (bound <= 20 * seen).all()
+
+
+@pytest.mark.parametrize("agents", [Agents(order=2), Agents(order=2, cascade=2)])
+def test_bounds_of_agents_at_no_instant_up_to_the_deadline_are_refused(agents: Agents):
+    graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)])
+    part = certify(graph, NominalProtocol(), [1, 2, 3], agents=agents, asks=Asks(simulation=False)).agents
+    assert part is not None and part.deviation_bound(0.5).shape == (3, 2, 1)
+    for remaining in (-0.5, math.nan, 2):
+        with pytest.raises(ParameterError, match=r"^remaining"):
+            part.deviation_bound(remaining)

@@ -33,7 +33,7 @@ from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.virtual_positions import TrackingProtocol
 from ptcc_certify.simulation.late_messages import simulate_late
 from ptcc_certify.simulation.run import simulate
-from ptcc_certify.simulation.virtual_positions import follow, simulate_vehicles
+from ptcc_certify.simulation.virtual_positions import follow, run_virtual_positions, simulate_vehicles
 
 F = Fraction
 VIRTUAL = Agents(order=2, exchange="virtual")
@@ -384,3 +384,31 @@ def test_leader_groups_moving_leaders_with_a_velocity_and_planes_are_refused():
     with pytest.raises(ParameterError, match="there are two"):
         two = {"messages": LateMessages(delay=1, gain_cap=1), "limits": GainLimits(gain_cap=2)}
         certify(pair, NominalProtocol(), [1, 2], agents=VIRTUAL, **two)
+
+
+@pytest.mark.parametrize("name", ["capped", "plain", "moving"])
+def test_bounds_over_time_are_those_of_the_gain_that_the_tracking_keeps_at_the_deadline(name: str):
+    late = certified(0, name).late
+    T = float(late.gain.gain.T)
+    position, velocity = late.vehicles.over_time(late.case, late.rows, T * np.array([1 - 1e-9, 1, 1.5]))
+    assert late.largest_bound(0.5 * T).shape == (1,) and not np.isnan(velocity).any()
+    if name == "plain":
+        assert np.isinf(velocity[:, 1:]).all() and np.isinf(position[:, 2]).all()
+        return
+    chosen = late.followers
+    assert velocity[chosen, 1] == pytest.approx(velocity[chosen, 0], rel=1e-6)
+    assert (velocity[:, :2] <= late.vehicles.velocity[:, None]).all() and np.isinf(velocity[chosen, 2]).all()
+    assert (position[chosen, 2] <= (position[chosen, 1] if late.leaders is None else late.after)).all()
+
+
+@pytest.mark.parametrize("parts", [{"limits": GainLimits(gain_cap=5)}, {"messages": LateMessages("0.1", gain_cap=5)}])
+def test_the_input_at_the_deadline_is_that_just_before_it(parts: dict[str, Any]):
+    graph, protocol = SignedDigraph.from_edges([(1, 2, 1), (2, 3, 1)]), NominalProtocol(T=1, rho1="0.1", rho2=1)
+    asks = Asks(simulation=False)
+    late = certify(graph, protocol, InitialState([0, 5, -5], v0=[0, 1, 0]), agents=VIRTUAL, asks=asks, **parts).late
+    virtual = run_virtual_positions(graph, protocol, late.messages, [0, 5, -5])
+    run = follow(virtual, late.tracking_protocol, late.messages.vehicles.v0)
+    end = int(np.argmax(run.remaining == 0))
+    near = int(np.flatnonzero(run.remaining > 1e-5)[-1])
+    assert np.abs(run.held_input[:, near]).max() > 0.1
+    assert run.held_input[:, end] == pytest.approx(run.held_input[:, near], abs=1e-2)

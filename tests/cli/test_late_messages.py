@@ -806,3 +806,63 @@ def test_what_is_not_built_of_vehicles_is_refused(command: str):
     more = {"design": ("--max-input", "10", "--shortest-deadline"), "plot": ("--what", "decay", "-o", "a.png")}
     said = ptcc(command, "team.csv", *START, *VEHICLES, *more[command])
     assert said.code == 2 and "this is not built yet" in said.err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("certify", "none.csv"), "--exchange: nobody listens to anybody"),
+        (("certify", "none.csv", "--gain-cap", "3"), "--exchange: nobody listens to anybody"),
+        (("certify", "none.csv", "--delay", "0.01"), "--delay: nobody listens to anybody"),
+        (("plot", "team.csv", "--what", "motion"), "ptcc plot c.json draws that"),
+    ],
+)
+def test_refusals_of_vehicles_name_what_was_given_and_what_works(words: tuple[str, ...], said: str):
+    Path("none.csv").write_text("source,target,weight\na,b,0\n")
+    zeros = ("--drop-zeros",) if words[0] == "certify" else ()
+    refused = ptcc(*words, *zeros, "--agents", "double-integrator", "--exchange", "virtual")
+    assert refused.code == 2 and said in refused.err
+
+
+def test_a_figure_of_the_motion_of_vehicles_is_refused_with_those_that_are_drawn():
+    assert ptcc("certify", "team.csv", *QUICK, *START, *VEHICLES, "--gain-cap", "20", "-o", "c.json").code == 0
+    cert = read_certificate("c.json")
+    with pytest.raises(ParameterError, match="vehicles that exchange virtual positions; take states, late or input"):
+        cert.plot("motion")
+    for what in ("states", "late", "input"):
+        cert.plot(what)
+
+
+def test_the_rate_of_vehicles_that_hear_at_once_is_not_left_open_for_late_messages():
+    words = ("team.csv", *START, *VEHICLES, "--gain-cap", "20", "--min-rate", "0.1")
+    text = " ".join(ptcc("certify", *words).out.split())
+    assert "no rate is proved of vehicles that exchange virtual positions" in text and "late messages" not in text
+
+
+def test_a_rate_of_a_family_is_told_where_the_check_accepts_it_though_not_all_is_checked():
+    """As with ``--verified``, which checks nothing of messages: the verdict is undecided, and the rate proved."""
+    edges = [("a", "b", 1), ("b", "c", -1)]
+    cert = certify(SignedDigraph.from_edges(edges), NominalProtocol(), uncertainty="10%", messages=LateMessages("0.01"))
+    assert cert.checked is not None and not cert.refused
+    unchecked = replace(cert.checked, verdict="undecided")
+    cert.__dict__["checked"] = unchecked
+    assert cert.verdict == "undecided" and not cert.refused
+    cert.__dict__["checked"] = replace(unchecked, accepted=False)
+    assert cert.refused
+
+
+def test_vehicles_that_begin_on_their_targets_with_velocities_are_judged_by_the_way_on_which_they_brake():
+    Path("pair.csv").write_text("source,target,weight\na,b,1\nb,c,-1\n")
+    words = ("--x0", "2,2,-2", "--agents", "double-integrator", "--exchange", "virtual", "--gain-cap", "200")
+    fast = ptcc("certify", "pair.csv", *words, "--rho2", "3", "--v0", "0,3,-1").out
+    assert "says little" not in fast
+    slow = ptcc("certify", "pair.csv", *words, "--rho2", "0.1", "--v0", "0,3,-1").out
+    assert "says little" in slow
+
+
+def test_a_saved_certificate_says_that_information_arrives_too_late_for_stages():
+    Path("pair.csv").write_text("source,target,weight\na,b,1\nb,c,-1\nc,d,1\n")
+    made = ptcc("certify", "pair.csv", "--delay", "0.6", "--x0", "1,2,3,4", "--no-simulation", "-o", "c.json")
+    assert made.code == 0 and "no deadlines of stages" in made.out
+    read = read_certificate("c.json")
+    assert read.late is not None and read.late.unarrived and "no deadlines of stages" in read.summary()

@@ -882,3 +882,36 @@ def test_the_command_names_every_file_of_a_statement(tmp_path: Path, monkeypatch
     assert certified == "certified  mine.tex"
     assert set(written.removeprefix("written    ").split(", ")) == {path.name for path in tmp_path.glob("mine*")}
     assert len(ptcc("report", "c.json", "-o", "mine.html").out.splitlines()) == 1
+
+
+_VEHICLES = {"agents": Agents(order=2, exchange="virtual")}
+_LATE, _SPEED = LateMessages("0.01"), MovingLeaders("0.3")
+
+
+@pytest.mark.parametrize(
+    ("parts", "without"),
+    [
+        ({"limits": GainLimits(gain_cap=30)}, "without limits"),
+        ({"messages": LateMessages("0.01", gain_cap=30)}, "without a gain cap, nothing late"),
+        ({"leaders": _SPEED}, "leaders at rest"),
+        ({"messages": _LATE, "leaders": _SPEED}, "nothing late, leaders at rest"),
+        ({"messages": _LATE, "uncertainty": "10%"}, "nothing late"),
+        ({**_VEHICLES, "limits": GainLimits(gain_cap=30)}, "of virtual positions, without a gain cap"),
+        ({**_VEHICLES, "uncertainty": "10%"}, "of virtual positions"),
+    ],
+)
+def test_latex_says_of_claim_bound_and_ends_what_they_are_without(parts: Any, without: str, tmp_path: Path) -> None:
+    graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1), ("c", "b", -1)])
+    vehicles = "agents" in parts
+    initial = InitialState([1, 2, 3], v0=[0, 7, -5] if vehicles else None)
+    more = {} if "uncertainty" in parts else {"asks": Asks(simulation=False, method="paper")}
+    certify(graph, NominalProtocol(), initial, **parts, **more).save(tmp_path / "c.json")
+    saved = read_certificate(tmp_path / "c.json")
+    text = report_latex(saved)
+    claim = next(line for line in text.splitlines() if " occurs at " in line)
+    bound = next(line for line in text.splitlines() if "very initial state" in line)
+    ends = next(line for line in text.splitlines() if "The table tells where agents end" in line)
+    assert all(f", {without}" in line for line in (claim, bound, ends))
+    assert ("z_{k}(t) \\to" in claim) == vehicles == ("x_{k}(t) \\to" not in claim)
+    assert (r"$\dot x_{k}(0)$" in text and "$-5$" in text) == vehicles
+    assert ("Initial velocity" in report_html(saved)) == vehicles == ("v(0) " in "\n".join(certificate_lines(saved)))

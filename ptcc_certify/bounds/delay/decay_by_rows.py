@@ -71,11 +71,16 @@ class RowBound:
         return self.witness.u * float(self.initial * self.left + self.floor + drift) * MORE + LEAST
 
     def decay(self, case: LateCase, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return ``e^(-b s_c)``, and what leaders that move and disturbances add in the bracket, (M,) floats each."""
+        """Return ``e^(-b s_c)``, and what leaders that move and disturbances add in the bracket, (M,) floats each.
+
+        After ``T`` the gain is low again, and they add at most ``after``.
+        """
         b, added = float(self.witness.b), np.zeros(t.shape)
         if case.leaders is not None:
             push = float(case.leaders.total) / float(self.witness.u.min())
-            added = push * drift_integral(case.protocol.gain, b, case.least_cap(self.cap), t)
+            before = push * drift_integral(case.protocol.gain, b, case.least_cap(self.cap), t)
+            later = math.inf if self.after is None else float(self.after)
+            added = np.where(t > float(case.protocol.T), later, before)
         return np.exp(-b * case.limited(self.cap).clock(t)), added
 
     def deviation_bound(self, case: LateCase, t: np.ndarray) -> np.ndarray:

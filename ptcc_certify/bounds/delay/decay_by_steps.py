@@ -62,10 +62,11 @@ class Steps:
         """Return what bounds ``|eps(T)|``, ``(F,)`` floats."""
         return np.asarray(self.bounds[-1] * (1 + _MORE) + 1e-300)
 
-    def deviation_bound(self, _: LateCase, t: np.ndarray) -> np.ndarray:
-        """Return what bounds ``|eps|`` at instants, ``(F, M)`` floats."""
+    def deviation_bound(self, case: LateCase, t: np.ndarray) -> np.ndarray:
+        """Return what bounds ``|eps|`` at instants, ``(F, M)`` floats; after ``T`` nothing does while leaders move."""
         at = np.searchsorted([float(x) for x in self.instants], t * (1 - 1e-15), side="right") - 1
-        return np.asarray(self.bounds[np.maximum(at, 0)].T)
+        lost = (t > float(case.protocol.T)) & (case.leaders is not None)  # the gain falls there
+        return np.where(lost, np.inf, self.bounds[np.maximum(at, 0)].T)
 
 
 def instants_of(T: Fraction, delay: Fraction, most: int) -> tuple[Fraction, ...]:

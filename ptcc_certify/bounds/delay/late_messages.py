@@ -27,6 +27,7 @@ from ptcc_certify.bounds.delay.delay_lmi import DelayLMIBound
 from ptcc_certify.bounds.delay.followers_of_groups import Settling
 from ptcc_certify.bounds.delay.small_delays import SmallDelays
 from ptcc_certify.bounds.delay.staged_deadlines import stage_deadlines
+from ptcc_certify.bounds.envelope import instants_from_0
 from ptcc_certify.bounds.float_conversion import floats, floats_up
 from ptcc_certify.bounds.virtual_positions import VehicleBounds, bound_vehicles, read_vehicles, vehicles_section
 from ptcc_certify.checker.delay_lmi import LateLMIWitness
@@ -208,8 +209,29 @@ class LateBounds:
         return self.staged is not None and len(set(self.staged)) == 1
 
     def deviation_bound(self, t: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Return what bounds ``|x_k - x_k*|`` at instants, of vehicles theirs, ``(F, M)`` floats; or infinite."""
-        t = np.asarray(t, dtype=float)
+        """Return what bounds ``|x_k - x_k*|`` at instants, of vehicles theirs, ``(F, M)`` floats.
+
+        Infinite where nothing does. While leaders rest it holds after ``T`` as before, for no proof asks how large the
+        gain is; while they move :attr:`after` is what is proved then. Of vehicles nothing is after ``T`` without a cap.
+
+        Parameters
+        ----------
+        t : (M,) array_like
+            In units of time, from 0 on; one number counts as an array of one.
+
+        Raises
+        ------
+        ParameterError
+            An instant is before 0, or no number.
+
+        Examples
+        --------
+        >>> late = certify(SignedDigraph.from_edges([("a", "b", 1)]), NominalProtocol(rho1="0.1"), [0, 5],
+        ...     messages=LateMessages("0.01", gain_cap=20), leaders=MovingLeaders(speed=1)).late
+        >>> bool(late.deviation_bound(1.5).max() <= late.after)
+        True
+        """
+        t = instants_from_0(t)
         if self.vehicles is not None:
             return self.vehicles.over_time(self.case, self.rows, t)[0][self.followers]
         least = np.full((self.followers.size, t.size), np.inf)
@@ -218,8 +240,8 @@ class LateBounds:
         return np.asarray(np.minimum.reduce([least, *bounds]))
 
     def largest_bound(self, t: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Return what bounds the largest ``|x_k - x_k*|`` of all agents at instants, ``(M,)`` floats."""
-        t = np.asarray(t, dtype=float)
+        """Return what bounds the largest of these of all agents, ``(M,)`` floats, as :meth:`deviation_bound` does."""
+        t = instants_from_0(t)
         if self.vehicles is not None:  # leaders that have a velocity move, too
             return np.asarray(self.vehicles.over_time(self.case, self.rows, t)[0].max(axis=0))
         least = self.deviation_bound(t).max(axis=0, initial=0)
@@ -267,10 +289,17 @@ def bound_late(case: LateCase) -> LateBounds:
     bounds = replace(bounds, rows=found, steps=steps, residual=_least(rows, each), input=_least(rows, inputs))
     if messages.vehicles is not None:
         return replace(bounds, vehicles=bound_vehicles(case, found, rows))
-    if not of_graph or messages.value_error or messages.gain_cap is not None or case.leaders is not None:
+    if not _may_be_staged(case):
         return bounds
     missed = find_missed(case, rows.followers.tolist())
     return replace(bounds, missed=missed, staged=stage_deadlines(rows, case.protocol.T, messages.age))
+
+
+def _may_be_staged(case: LateCase) -> bool:
+    """Tell whether late messages of a graph are all that keeps followers of single leaders from settling exactly."""
+    told = case.messages
+    alone = not (told.own_delay or told.value_error or told.gain_cap is not None or told.vehicles or case.leaders)
+    return alone and isinstance(case.structure, Structure) and not case.groups
 
 
 def late_rows(case: LateCase) -> FollowerRows:
@@ -355,13 +384,16 @@ def read_late(
     if section.steps is not None:
         start = floats(proved["late-steps", "messages.steps"]["witness"].start)
         steps = bound_steps(case, late_rows(case), tuple(section.steps.instants), start)
+    staged = None if section.staged is None else tuple(section.staged)
+    if staged is None and _may_be_staged(case) and stage_deadlines(late_rows(case), protocol.T, messages.age) == ():
+        staged = ()  # which files leave out
     return LateBounds(
         case,
         relative,
         rows=tuple(rows),
         steps=steps,
         missed=missed,
-        staged=None if section.staged is None else tuple(section.staged),
+        staged=staged,
         residual=floats_up(section.residual),
         form=_of_whole_graph(SmallDelays, section.form, proved.get(("late-form", "messages.form"))),
         lmi=_of_whole_graph(DelayLMIBound, section.lmi, proved.get(("late-lmi", "messages.lmi"))),

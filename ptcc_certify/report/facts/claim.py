@@ -53,7 +53,7 @@ def assumptions(certificate: Certificate) -> list[str]:
     assumed = {
         "without limits": bool(certificate.limits),
         "of virtual positions": virtual,
-        "without a gain cap": messages is not None and virtual and messages.gain_cap is not None,
+        "without a gain cap": not certificate.limits and messages is not None and messages.gain_cap is not None,
         "nothing late": messages is not None and not (virtual and messages.exact),
         "leaders at rest": certificate.proof.leaders_move,
     }

@@ -34,12 +34,15 @@ _SHORT, _LONG = 2 * TEXT - 20, 12 * TEXT
 
 
 def initial_facts(certificate: Certificate, origins: Mapping[str, str], alone: bool) -> Facts:
-    """Tell the initial positions, and where they come from; ``alone`` if those of the simulated run alone."""
+    """Tell initial positions, and velocities, and where they come from; ``alone`` if of the simulated run alone."""
     if (begin := certificate.proof.initial_positions) is not None:
         drawn = f" ({origins['x(0)']})" if "x(0)" in origins else ""
         text = value_list(certificate.labels, begin) + drawn
         text += ", of the simulated run alone" if alone else ""
         yield Fact(head="x(0)", value=dict(zip(certificate.labels, begin, strict=True)), note=text, detail=True)
+    if (v0 := certificate.proof.velocities) is not None and any(v0):
+        values = dict(zip(certificate.labels, v0, strict=True))
+        yield Fact(head="v(0)", value=values, note=value_list(certificate.labels, v0), detail=True)
 
 
 def final_facts(certificate: Certificate) -> Facts:

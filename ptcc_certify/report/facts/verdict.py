@@ -43,9 +43,8 @@ def _beginning(certificate: Certificate, origins: Mapping[str, str]) -> list[str
         for i, name in enumerate(("x(0)", "v(0)", "a(0)")[: certificate.proof.agents.order]):
             still = i > 0 and not any(chain[i] for agent in states for chain in agent)
             begin.append(f"{name} {origins.get(name, '0' if still else 'given')}")
-    vehicles = None if certificate.proof.late is None else certificate.proof.late.messages.vehicles
-    if vehicles is not None:
-        begin.append(f"v(0) {origins.get('v(0)', 'given' if any(vehicles.v0) else '0')}")
+    if (v0 := certificate.proof.velocities) is not None:
+        begin.append(f"v(0) {origins.get('v(0)', 'given' if any(v0) else '0')}")
     if certificate.initial_set is not None and (not begin or certificate.only_drawn):
         begin = [initial_states_text(certificate.initial_set)]
     begin += ["in a formation"] if certificate.proof.offsets is not None else []

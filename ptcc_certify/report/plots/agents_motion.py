@@ -50,6 +50,10 @@ def agents_run(subject: Any) -> AgentsTrajectory:
         return subject.simulate()
     if isinstance(subject, AgentsTrajectory):
         return subject
+    if isinstance(subject, Certificate) and subject.proof.velocities is not None:
+        raise ParameterError(
+            "this figure is not drawn yet of vehicles that exchange virtual positions; take states, late or input"
+        )
     raise ParameterError("this figure is of agents of order n; certify with agents=Agents(order=2), say")
 
 

@@ -157,7 +157,7 @@ def ideal_text(certificate: Certificate) -> str:
     virtual = late is not None and late.messages.vehicles is not None
     absent = {
         "virtual positions": virtual,
-        "no limits": certificate.limits or (virtual and late is not None and late.messages.gain_cap is not None),
+        "no limits": certificate.limits or (late is not None and late.messages.gain_cap is not None),
         "nothing late": late is not None and not (virtual and late.messages.exact),
         "leaders at rest": moving,
     }
