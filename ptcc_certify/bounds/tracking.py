@@ -12,8 +12,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from lmi.exact.decimal_rounding import float_up, up
 from ptcc_certify.bounds.envelope import remaining_part
 from ptcc_certify.bounds.float_conversion import floats, floats_up
 from ptcc_certify.checker.leaders import LeadersAsked, LeadersSection
+from ptcc_certify.checker.messages_asked import Moving
 from ptcc_certify.checker.obligations import CheckReport
 from ptcc_certify.checker.section_declarations import RowVector
 from ptcc_certify.checker.side_files import Numbers
@@ -224,14 +226,15 @@ def tracking_obligations(tracking: Tracking | None) -> Iterator[Obligation]:
         yield Obligation("tracking", "leaders", {"a": witness.b}, RowVector(u=Numbers(witness.u)))
 
 
-def asked_leaders(leaders: MovingLeaders) -> LeadersAsked:
-    """Return how leaders move, as files have it."""
-    return LeadersAsked(speed=leaders.speed, disturbance=leaders.disturbance, sign_gain=leaders.sign_gain)
+def asked_leaders(leaders: MovingLeaders | None, kind: type[Moving] = LeadersAsked) -> Any:
+    """Return how leaders move, as files have it in a section of this kind; None of leaders at rest."""
+    return None if leaders is None else kind(**{one.name: getattr(leaders, one.name) for one in fields(kind)})
 
 
-def read_leaders(section: LeadersAsked) -> MovingLeaders:
-    """Return what a certificate says of how leaders move."""
-    return MovingLeaders(section.speed, section.disturbance, section.sign_gain)
+def read_leaders(section: Moving) -> MovingLeaders:
+    """Return what a certificate says of how leaders move, in a section of any kind."""
+    told = {one.name for one in fields(MovingLeaders)}
+    return MovingLeaders(**{name: value for name, value in vars(section).items() if name in told})
 
 
 def leaders_section(tracking: Tracking) -> LeadersSection:

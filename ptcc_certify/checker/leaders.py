@@ -9,20 +9,19 @@ from lmi.exact.decimal_rounding import down
 from lmi.exact.work import spend
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import Family
+from ptcc_certify.checker.messages_asked import Moving
 from ptcc_certify.checker.protocol import Begin, Protocol
 from ptcc_certify.checker.reading import length, need
 from ptcc_certify.checker.rows import Rows, followers_of
-from ptcc_certify.checker.section_declarations import Agents, NotNegative
+from ptcc_certify.checker.section_declarations import Agents
 from ptcc_certify.checker.stated_bounds import Stated
 from ptcc_certify.checker.structure import Structure
 
 
 @dataclass(frozen=True, kw_only=True)
-class LeadersAsked:
-    """How leaders move, and followers are disturbed."""
+class LeadersAsked(Moving):
+    """How leaders move, and followers are disturbed and kept on their targets."""
 
-    speed: NotNegative
-    disturbance: NotNegative
     sign_gain: Fraction | None
 
 
@@ -41,7 +40,7 @@ def check_leaders(doc: Document, of: Structure | Family, protocol: Protocol, beg
         return
     section = doc.section("leaders")
     need(not protocol.sliding, "leaders that move under the sliding-mode protocol")
-    initial, after, sign, push = section.initial, section.after, section.sign_gain, section.speed + section.disturbance
+    initial, after, sign, push = section.initial, section.after, section.sign_gain, section.push
     need(sign is None or sign >= push, "sign_gain is below speed + disturbance")
     followers = followers_of(doc, of, begin)
     doc.at = "leaders"

@@ -12,6 +12,7 @@ import numpy as np
 
 from lmi.exact.elementary_enclosures import rounded
 from ptcc_certify.bounds.final_state.of_graph import Influence
+from ptcc_certify.bounds.tracking import asked_leaders
 from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above
 from ptcc_certify.checker.late_input import gain_above
 from ptcc_certify.checker.lyapunov_form import Form
@@ -166,8 +167,7 @@ class LateCase:
     @cached_property
     def exact(self) -> Messages:
         """What the formulas of the check know of the messages, latencies left out."""
-        told, leaders = self.messages, self.leaders
-        moving = None if leaders is None else Moving(speed=leaders.speed, disturbance=leaders.disturbance)
+        told, moving = self.messages, asked_leaders(self.leaders, Moving)
         late, latency = told.own_delay, Numbers([Fraction(0)])
         return Messages(self.protocol.gain.exact, latency, told.age, late, told.value_error, told.gain_cap, moving)
 

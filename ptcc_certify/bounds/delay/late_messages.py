@@ -29,6 +29,7 @@ from ptcc_certify.bounds.delay.small_delays import SmallDelays
 from ptcc_certify.bounds.delay.staged_deadlines import stage_deadlines
 from ptcc_certify.bounds.envelope import instants_from_0
 from ptcc_certify.bounds.float_conversion import floats, floats_up
+from ptcc_certify.bounds.tracking import asked_leaders, read_leaders
 from ptcc_certify.bounds.virtual_positions import VehicleBounds, bound_vehicles, read_vehicles, vehicles_section
 from ptcc_certify.checker.delay_lmi import LateLMIWitness
 from ptcc_certify.checker.late_form import LateFormWitness
@@ -350,7 +351,7 @@ def delays(messages: LateMessages, of: SignedDigraph | Family, leaders: MovingLe
         own="late" if messages.own_delay else "fresh",
         value_error=messages.value_error,
         gain_cap=messages.gain_cap,
-        leaders=None if leaders is None else Moving(speed=leaders.speed, disturbance=leaders.disturbance),
+        leaders=asked_leaders(leaders, Moving),
     )
 
 
@@ -371,7 +372,7 @@ def read_late(
     vehicles = read_vehicles(section.vehicles)
     messages = read_messages(section, structure, None if vehicles is None else Vehicles(vehicles.v0))
     proved, moving = report.proved, section.leaders
-    leaders = None if moving is None else MovingLeaders(moving.speed, moving.disturbance)
+    leaders = None if moving is None else read_leaders(moving)
     case = LateCase(structure, protocol, messages, leaders=leaders)
     rows = []
     for i, row in enumerate(section.rows):
