@@ -30,6 +30,7 @@ def test_quick(case):
 SLOW, OTHERS = [f"slow[{k}]" for k in range(6)], ["of_two[0]", "of_two[1]", "quick[0]", "quick[1]"]
 
 
+@pytest.mark.few(5)
 @pytest.mark.parametrize(
     ("options", "which", "left"),
     [

@@ -239,6 +239,7 @@ def certified(name: str, x0: tuple[int, ...] | None = (1, 2, -3)) -> Certificate
     return certify(UNSURE, PROTOCOL, x0, **BESIDE[name])  # type: ignore[no-any-return]
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("x0", [(1, 2, -3), None], ids=["state", "every state"])
 @pytest.mark.parametrize("name", BESIDE)
 def test_what_is_certified_is_read_back(name: str, x0: tuple[int, ...] | None, tmp_path: Path):
@@ -322,6 +323,7 @@ def forged(name: str, path: str, value: Any) -> str | None:
     return check(data | {"digest": digest(data)}).rejected
 
 
+@pytest.mark.few(5)
 @pytest.mark.parametrize(
     ("name", "path", "value"),
     [

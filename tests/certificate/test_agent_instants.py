@@ -68,6 +68,7 @@ def deviations(part: AgentsPart | CascadePart) -> tuple[np.ndarray, np.ndarray]:
     return q, scaled * eta ** np.arange(part.order)[:, None] * np.exp(-run.rate * run.clock[known] / 2)
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize(("graph", "kind"), thinned(CASES, 3))  # every kind once, by turns on every graph
 def test_bounds_are_above_the_motion_and_at_99_percent_within_ten_times_of_it(graph: str, kind: str):
     part = part_of(made(graph, kind))

@@ -220,6 +220,7 @@ def test_bounds_of_a_formation_under_a_cap_hold_on_the_motion_that_agents_of_ord
     assert left.largest <= max(part.input) * (1 + Fraction(1, 10**9))
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("name", BESIDE)
 def test_runs_of_a_formation_tell_positions(name: str):
     """What is asked and the run beside the bounds begin at ``x0``, and differ from ``x - h`` by ``h`` at any time."""
@@ -368,6 +369,7 @@ STARTED = {
 }
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("kind", STARTED)
 def test_a_limit_below_the_input_at_time_0_is_refuted_and_one_above_it_is_not(kind: str):
     import casadi as ca
@@ -484,6 +486,7 @@ def test_just_above_the_least_decay_the_input_is_told_not_to_be_certified_bounde
     assert "decay=4 bounds it" in certificate.assessment.text
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("agents", "why", "mend"),
     [

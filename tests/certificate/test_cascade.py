@@ -173,6 +173,7 @@ def with_larger_alpha(part: CascadePart) -> CascadePart:
     )
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("change", [with_smaller_roots, with_faster_functions, with_larger_alpha])
 def test_false_bounds_are_below_where_agents_are_enclosed_and_below_a_run(change: Any):
     """Also below one that is judged above :data:`~ptcc_certify.bounds.agents.run_against_bounds.RESOLVED`."""

@@ -77,6 +77,7 @@ def rejected(data: Json, where: str, reason: str) -> None:
         assert reason in (report.reason or ""), (report.rejected, report.reason)
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("name", SETTINGS)
 def test_every_kind_of_cascade_is_accepted_and_has_the_shape_of_the_schema(name: str):
     data = made(name)
@@ -84,6 +85,7 @@ def test_every_kind_of_cascade_is_accepted_and_has_the_shape_of_the_schema(name:
     assert data["verdict"] == "certified" and VALIDATOR.is_valid(data)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("name", "kind"), [("every function", "camps"), ("slow", "enemies"), ("formation", "singles")])
 def test_what_is_accepted_is_true(name: str, kind: str):
     data = made(name, kind)

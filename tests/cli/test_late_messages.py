@@ -91,6 +91,7 @@ def test_a_behaviour_asked_for_at_T_is_refuted_where_an_agent_is_proved_to_miss_
     assert "this certificate's limit is" in " ".join(left.out.split())
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("graph", "delay", "more", "status"),
     thinned(

@@ -16,6 +16,7 @@ CASES = [
 ]
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize(("kind", "seed"), CASES)
 def test_what_is_written_is_accepted_and_nothing_goes_wrong(
     kind: str, seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
