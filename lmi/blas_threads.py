@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import threading
 from collections.abc import Iterator
 from typing import Any
 
 _lock, _inside = threading.Lock(), [0]
 _limits: list[Any] = []
+
+
+@functools.cache
+def _loaded() -> Any:
+    """Return what limits the libraries that are loaded, which takes milliseconds to find."""
+    import scipy.linalg  # noqa: F401  which brings a BLAS of its own
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
 
 
 @contextlib.contextmanager
@@ -29,13 +39,10 @@ def one_thread(wanted: bool = True) -> Iterator[None]:
     if not wanted:
         yield
         return
-    import scipy.linalg  # noqa: F401  which brings a BLAS of its own: only what is loaded is limited
-    from threadpoolctl import threadpool_limits
-
     with _lock:
         _inside[0] += 1
         if _inside[0] == 1:
-            _limits.append(threadpool_limits(limits=1, user_api="blas"))
+            _limits.append(_loaded().limit(limits=1, user_api="blas"))
     try:
         yield
     finally:
