@@ -24,8 +24,8 @@ from lmi.uncertain_matrix import UncertainMatrix
 _WHOLE_ROWS = {False: 60, True: 24}
 #: Seconds that a program takes for each block: what multiplies a power of its rows, by what ``P`` is.
 _SECONDS = {"full": (1.8e-7, 4), "diagonal": (2e-3, 1), "fixed": (0.02, 1)}
-#: Rows up to which programs are built once, and how many of them are kept.
-_ONCE_ROWS, _KEPT = 20, 64
+#: Rows up to which programs are built once, and of how many modes; how many of them are kept.
+_ONCE_ROWS, _ONCE_MODES, _KEPT = 20, 8, 64
 
 #: What multiplies the variables in the inequality of a mode: two or four numbers and arrays.
 Row = tuple[Any, ...]
@@ -65,7 +65,8 @@ def rows_of(modes: Sequence[UncertainMatrix], rates: Sequence[float], unit: floa
     for mode, b in zip(modes, rates, strict=True):
         over = unit or float(np.abs(mode.A).max(initial=0.0)) or 1.0
         H, F = mode.H / math.sqrt(over), mode.F / math.sqrt(over)
-        squares = (H[:, None] * H[None]).reshape(len(H) ** 2, H.shape[1])  # columns are those of the matrices h h'
+        with np.errstate(over="ignore"):  # then the solver refuses them
+            squares = (H[:, None] * H[None]).reshape(len(H) ** 2, H.shape[1])  # columns are those of matrices h h'
         rows.append((mode.A / over, np.array(b / over), *((F, squares) if mode.radii.size else ())))
     return rows
 
@@ -127,11 +128,13 @@ def solved(
         from scipy import sparse
     checkpoint()
     size = len(rows[0][0]) + max(row[2].shape[1] if len(row) > 2 else 0 for row in rows)
-    if size <= _ONCE_ROWS:
+    if size <= _ONCE_ROWS and len(rows) <= _ONCE_MODES:
         shapes = tuple(x.shape for x in numbers), tuple(tuple(x.shape for x in row) for row in rows)
         problem, variables, parameters = _built_once(goal, diagonal, *shapes, threading.get_ident())
         for parameter, value in zip(parameters, [*numbers, *(x for row in rows for x in row)], strict=True):
             parameter.value = value
+        for variable in problem.variables():
+            variable.save_value(None)  # of the last time
     else:
         sparse_rows = [tuple(sparse.csr_array(x) if x.ndim else x for x in row) for row in rows]  # zeros are kept
         problem, variables = _program(goal, diagonal, numbers, sparse_rows)

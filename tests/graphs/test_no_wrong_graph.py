@@ -489,6 +489,7 @@ OTHERS = [
     Input("g.npy", npy([[0, 1], [-3, 0]], "u2"), says=("65533 is what -3 becomes in uint16",)),
     Input("g.csv", "source,target,weight\n1,2.0,1\n2,3.0,-1\n3,1.0,1\n4,,\n", says=("2 and 2.0 are one number",)),
     Input("g.csv", "source,target,weight\n1.0,2.0,1\n2.0,1.0,-1\n", "1.0>2.0=1 2.0>1.0=-1"),
+    Input("g.sif", "a\tactivates\tb\nType 1 diabetes\n#version 1 of it\n", "a>b=1"),
     Input("g.csv", "sep=;\na;b;1\nb;a;-2\n", "a>b=1 b>a=-2"),
     Input("g.csv", "source,target,weight\na,b,1\n\ufeffb,a,-1\n", "a>b=1 b>a=-1"),
     Input("g.csv", "# target,source,weight\na,b,1\nb,a,-1\n", says=("a comment names the columns", "--columns")),

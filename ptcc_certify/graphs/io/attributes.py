@@ -13,7 +13,7 @@ import numpy as np
 from ptcc_certify.errors import FormatError, GraphError, NumberError
 from ptcc_certify.graphs.io.columns_beside import column_of
 from ptcc_certify.graphs.io.raw_edges import Beside, Rows, Signs, distinct, rows_of
-from ptcc_certify.graphs.io.signs import family_titles, is_sign, weight_and_sign
+from ptcc_certify.graphs.io.signs import WEIGHT, family_titles, is_sign, plain, sign_of_word, weight_and_sign
 from ptcc_certify.graphs.rationals import parse_exact, shorten
 from ptcc_certify.graphs.reading import Reading
 
@@ -120,13 +120,20 @@ def _by_title(pairs: Pairs, told: str | None, where: Callable[[], str]) -> dict[
     for key, value in pairs:
         title, text = str(key).lower(), str(value).strip()
         first = texts.get(title)
-        if first and text and title != "id" and told in (None, title) and not _same(first, text):
+        counts = title == told if told else _counts(title, first, text)
+        if first and text and counts and not _same(first, text):
             both = f"{shorten(first)} and {shorten(text)}"
             raise FormatError(
                 f'{where()}: two attributes are named "{shorten(title)}" ({both}); keep one, or rename it'
             )
         texts[title] = text or first or ""
     return texts
+
+
+def _counts(title: str, *values: str | None) -> bool:
+    """Tell whether an attribute may be a weight, a sign or a direction, by its title or a value."""
+    titled = plain(title) in WEIGHT or is_sign(title) or "direct" in title or family_titles([title])
+    return bool(titled) or any(value and sign_of_word(value) is not None for value in values)
 
 
 def _same(one: str, other: str) -> bool:

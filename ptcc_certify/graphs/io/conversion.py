@@ -286,7 +286,8 @@ def _is_list_of_graphs(graphs: Any) -> bool:
     return all(
         isinstance(one, SignedDigraph | Family | str | os.PathLike)
         or hasattr(one, "is_multigraph")
-        or getattr(one, "ndim", 0) == 2  # a matrix, or a DataFrame
+        or hasattr(one, "columns")
+        or (getattr(one, "ndim", 0) == 2 and one.shape[0] == one.shape[1])
         for one in graphs
     )
 

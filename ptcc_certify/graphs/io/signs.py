@@ -141,7 +141,9 @@ def interval_columns(first: Sequence[str], place: str) -> tuple[int | None, int 
 
 
 def family_titles(titles: Sequence[str]) -> list[str]:
-    """Return titles of intervals of weights, or of edges that may fail: both ends, or one that says that they may.
+    """Return titles of intervals of weights, or of edges that may fail, where they make a family of a graph.
+
+    One end alone does if its title names the weight; ``max`` alone may be anything.
 
     Examples
     --------
@@ -149,4 +151,5 @@ def family_titles(titles: Sequence[str]) -> list[str]:
     (['min', 'max'], [])
     """
     of = [[title for title in titles if plain(title) in map(plain, names)] for names in (_LEAST, _LARGEST, _OPTIONAL)]
-    return [*of[2], *of[0], *of[1]] if of[2] or (of[0] and of[1]) else []
+    named = any("weight" in title.lower() or plain(title) in ("wmin", "wmax") for title in (*of[0], *of[1]))
+    return [*of[2], *of[0], *of[1]] if of[2] or named or (of[0] and of[1]) else []
