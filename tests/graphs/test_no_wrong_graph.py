@@ -494,6 +494,8 @@ OTHERS = [
     Input("g.csv", "source,target,weight\na,b,1\n\ufeffb,a,-1\n", "a>b=1 b>a=-1"),
     Input("g.csv", "# target,source,weight\na,b,1\nb,a,-1\n", says=("a comment names the columns", "--columns")),
     Input("g.csv", "# source,target,weight\na,b,1\nb,a,-1\n", "a>b=1 b>a=-1"),
+    Input("g.csv", "# trust from users to users, from 2020 to 2021\na,b,1\nb,a,-1\n", "a>b=1 b>a=-1"),
+    Input("g.txt", "# downloaded from here, write to me\n1 2 1\n2 1 -1\n", "1>2=1 2>1=-1"),
     Input("g.txt", "# FromNodeId\tToNodeId\tSign\n1\t2\t1\n2\t1\t-1\n", "1>2=1 2>1=-1"),
     Input("g.csv", "Gene1,Gene2,min,max\na,b,-1,2\n", says=("a family of graphs",)),
     Input("g.csv", "source,target,weight,max\na,b,-1,2\n", "a>b=-1"),

@@ -127,7 +127,7 @@ def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
         place, message = one_message(rows.problems, " ".join)
         raise FormatError(f"{', '.join(filter(None, (name, place)))}: {message}")
     if not columns.titles and not columns.told:
-        _refuse_titles_of_comments(data, name)
+        _refuse_titles_of_comments(data, name, len(table[0]) if table else 0)
         _refuse_ambiguous(draft, rows, data, konect)
     rows.undirected = undirected
     return rows
@@ -272,13 +272,19 @@ def _refuse_titles(row: list[str], place: str, data: bytes) -> None:
         raise FormatError(f"{place}: the header {titles} names no source and target; {mend}")
 
 
-def _refuse_titles_of_comments(data: bytes, name: str) -> None:
-    """Refuse rows without a header whose columns a comment names in another order, as numpy.savetxt writes it."""
+def _refuse_titles_of_comments(data: bytes, name: str, width: int) -> None:
+    """Refuse rows without a header whose columns a comment names in another order, as numpy.savetxt writes it.
+
+    It has as many words as rows have fields, and one for each end and the weight; other comments are prose.
+    """
     for line in data[:2000].decode("utf-8", "replace").removeprefix("\ufeff").splitlines():
         if line.strip()[:1] not in "#%":
             break
         titles = re.split(r"\s*[,;\t ]\s*", line.strip(" \t#%"))
-        if (ends := edge_columns(titles, name)) is not None and ends[:2] != (0, 1):
+        if len(titles) != width or len(set(map(plain, titles))) < width:
+            continue
+        ends = edge_columns(titles, name)
+        if ends is not None and ends[2] is not None and ends[:2] != (0, 1):
             mend = f"remove {line.strip()[0]} before {shorten(titles[0])}, or tell them: --columns 1,2,3"
             raise FormatError(f"{name}: a comment names the columns; {mend}")
 
