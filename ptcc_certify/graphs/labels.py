@@ -98,9 +98,11 @@ def refuse_written_twice(labels: Sequence[str], place: str) -> None:
     ptcc_certify.errors.FormatError: a.csv: nodes 2 and 2.0 are one number written in two ways; write it in one
     """
     there = set(labels)
+    if not all(re.fullmatch(r"-?[0-9]+(\.0+)?", label) for label in there):
+        return  # names, such as those of versions
     for label in labels:
         whole, _, zeros = label.partition(".")
-        if zeros and whole in there and not zeros.strip("0") and whole.removeprefix("-").isdecimal():
+        if zeros and whole in there:
             what = f"nodes {shorten(whole)} and {shorten(label)} are one number written in two ways; write it in one"
             raise FormatError(f"{place}: {what}") if place else GraphError(what)
 

@@ -488,6 +488,8 @@ OTHERS = [
     Input("g.npy", npy([[0, 1], [200, 0]], "u1"), "2>1=1 1>2=200"),
     Input("g.npy", npy([[0, 1], [-3, 0]], "u2"), says=("65533 is what -3 becomes in uint16",)),
     Input("g.csv", "source,target,weight\n1,2.0,1\n2,3.0,-1\n3,1.0,1\n4,,\n", says=("2 and 2.0 are one number",)),
+    Input("g.csv", "source,target,weight\n10,10.0,1\n10.0,beta,-1\n", "10>10.0=1 10.0>beta=-1"),
+    Input("g.sif", "a\tactivates\tb\n#1\t1\tb\n", says=("line 2", "a row or a comment")),
     Input("g.csv", "source,target,weight\n1.0,2.0,1\n2.0,1.0,-1\n", "1.0>2.0=1 2.0>1.0=-1"),
     Input("g.sif", "a\tactivates\tb\nType 1 diabetes\n#version 1 of it\n", "a>b=1"),
     Input("g.csv", "sep=;\na;b;1\nb;a;-2\n", "a>b=1 b>a=-2"),
@@ -1025,6 +1027,17 @@ def test_what_is_several_graphs_or_no_number_in_memory_is_refused_in_one_line():
         ptcc.as_graph([(1, 2.0, 1), (2, 1.0, -1)])
     with pytest.raises(GraphError, match="one number written in two ways"):
         ptcc.as_family([(1, 2.0, 1, 2), (2, 1.0, -1, 0)])
+
+
+def test_a_row_that_is_a_comment_is_told_above_all_others_too(tmp_path):
+    graph = read_graph(put(tmp_path, "g.csv", "#1,b,1\nb,#1,-1\n"))
+    assert graph.read["notes"] == ("ignored as a comment: #1,b,1",)
+
+
+def test_labels_that_begin_with_a_byte_order_mark_are_read_back(tmp_path):
+    graph = ptcc.as_graph([("x", "\ufeffa", 1), ("\ufeffa", "x", -1)])
+    ptcc.write_graph(graph, tmp_path / "g.csv")
+    assert read_graph(tmp_path / "g.csv") == graph
 
 
 def test_a_node_that_looks_like_a_row_is_written_so_that_it_is_read_back(tmp_path):

@@ -134,15 +134,17 @@ def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
 
 
 def notes_on_comments(data: bytes) -> tuple[str, ...]:
-    r"""Note comments below the first row that look like rows of edges, which a label that begins with # makes of one.
+    r"""Note comments that look like rows of edges, which a label that begins with # makes of one.
 
     Examples
     --------
-    >>> notes_on_comments(b"a,b,1\n#b,a,2\n")
+    >>> notes_on_comments(b"#Gene1,Gene2,Score\na,b,1\n#b,a,2\n")
     ('ignored as a comment: #b,a,2',)
     """
-    first = re.search(rb"^[^#%\s].*$", data, re.MULTILINE)
-    lines = re.findall(rb"^[#%][^\s#%,;].*[,;\t].*[,;\t].*$", data[first.end() :], re.MULTILINE) if first else []
+    found = re.findall(rb"^[#%][^\s#%,;].*[,;\t].*[,;\t].*$", data, re.MULTILINE)
+    fields = (re.split(rb"\s*[,;\t]\s*", line.strip())[1:] for line in found)
+    entries = (any(is_entry(one.decode("utf-8", "replace")) for one in some) for some in fields)
+    lines = [line for line, holds in zip(found, entries, strict=True) if holds]
     if not lines:
         return ()
     rest = f" and {len(lines) - 1} more" if len(lines) > 1 else ""
@@ -377,6 +379,6 @@ def _cell(label: str, name: str) -> str:
     if odd or len(label) > MAX_LINE // 5:
         what = f"is empty, not Unicode text, has blanks around it or is longer than {MAX_LINE // 5} characters"
         raise FormatError(f'{name}: label "{shorten(label)}" {what}; rename the node')
-    if label[0] in "#%" or re.search(r'[,;"\t\n\r]', label) or _other_separator(label):
+    if label[0] in "#%\ufeff" or re.search(r'[,;"\t\n\r]', label) or _other_separator(label):
         return '"' + label.replace('"', '""') + '"'
     return label

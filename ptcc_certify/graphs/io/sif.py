@@ -42,4 +42,4 @@ def _is_edge(line: str, fields: list[str]) -> bool:
     words = fields if len(fields) > 2 else re.split(r"[\s,;]+", line.strip())
     if len(words) < 3 or words[0][:2] in ("#", "##"):
         return False
-    return sign_of_word(words[1]) is not None or words[1] in ("+1", "-1")
+    return sign_of_word(words[1]) is not None or words[1] in ("+1", "-1") or (words is fields and words[1] == "1")
