@@ -32,7 +32,7 @@ from ptcc_certify.errors import Change, Sentence, spell
 from ptcc_certify.graphs.io.graph_files import reading_flags
 from ptcc_certify.model.agents import plant_text
 from ptcc_certify.report import html_text as texts
-from ptcc_certify.report.facts.claim import assumptions
+from ptcc_certify.report.facts.claim import assumptions, beside_law
 from ptcc_certify.report.facts.constrained_switching import signal_text
 from ptcc_certify.report.facts.decay import BOUND_KINDS
 from ptcc_certify.report.facts.graph import leader_facts
@@ -150,6 +150,7 @@ def _environment() -> jinja2.Environment:
     environment.filters |= {"counted": counted, "grouped": "{:,}".format, "flags": reading_flags, "merged": dict.__or__}
     environment.filters |= {
         "head": lambda head: texts.typeset(texts.head_text(head)),
+        "words": set_note,
         "set": lambda fact: set_note(fact.note),
     }
     style = (resources.files("ptcc_certify.report") / "page.css").read_text(encoding="utf-8")
@@ -197,6 +198,7 @@ def _view(saved: Certificate) -> dict[str, Any]:
         "answers": [(head, list(each)) for head, each in groupby(answers, lambda fact: fact.head)],
         **{"asked": asked, "details": details, "lacks": lacks},
         "graph_text": set_note(facts[0].note),
+        "beside_law": beside_law(saved),
         "equations": texts.formula_svg(protocol_latex(saved), inline=False),
         "parameters": [(name, getattr(saved.protocol, name)) for name in texts.parameter_names(saved.protocol)],
         "states": states_table(saved),
@@ -260,7 +262,7 @@ def _title(saved: Certificate) -> Markup:
 
 def _without(saved: Certificate) -> str:
     """Say what a claim is without, where more was asked."""
-    return "".join(f", {assumption}" for assumption in assumptions(saved) if assumption != "without limits")
+    return "".join(f", {assumption}" for assumption in assumptions(saved))
 
 
 def _of_family(saved: Certificate, why: Counterexamples) -> dict[str, Any]:

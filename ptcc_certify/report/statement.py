@@ -25,7 +25,7 @@ from ptcc_certify.model.agents import plant_text
 from ptcc_certify.model.casadi_latex import symbol_latex
 from ptcc_certify.report import html_text as texts
 from ptcc_certify.report.facts.agents import claimed_of
-from ptcc_certify.report.facts.claim import assumptions, sharpest
+from ptcc_certify.report.facts.claim import assumptions, beside_law, sharpest
 from ptcc_certify.report.facts.constrained_switching import signal_text
 from ptcc_certify.report.facts.of_certificate import facts_of
 from ptcc_certify.report.latex_text import latex_of_number, latex_of_sentence, latex_of_text
@@ -103,6 +103,7 @@ def report_latex(saved: Certificate, figures: dict[str, str] | None = None) -> s
         **{"saved": saved, "certified": saved.verdict == "certified", "sliding": saved.protocol.reaching is not None},
         **{"n": len(saved.labels), "named": _named(saved.labels), "part": saved.proof.agents},
         "protocol": protocol_latex(saved),
+        "beside_law": beside_law(saved),
         "parameters": [(Markup(symbol_latex(name)), getattr(saved.protocol, name)) for name in names],
         "proved": [fact for fact in told if fact.standing == "proved"],
         "unproved": [fact for fact in told if fact.standing == "unproved"],
@@ -321,6 +322,7 @@ def _environment() -> jinja2.Environment:
             "latex": Markup,
             "rational": _rational,
             "coordinate": _coordinate,
+            "words": latex_of_sentence,
             "sentence": lambda fact: latex_of_sentence(fact.note),
         },
         "above": lambda x, digits: latex_of_number(texts.above(x, digits)),

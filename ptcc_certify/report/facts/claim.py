@@ -11,11 +11,13 @@ import numpy as np
 from lmi.exact.decimal_rounding import counted, down, near
 from ptcc_certify.certificate.constrained_switching.claims import LastModeClaim
 from ptcc_certify.certificate.fact import Fact, Facts
+from ptcc_certify.checker.input_formulas import Limits
 from ptcc_certify.errors import labelled
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.structure import BIPARTITE_CONTAINMENT, STABILITY, Structure
 from ptcc_certify.report.facts.agents import claimed_of
 from ptcc_certify.report.facts.constrained_switching import RESTS, of_mode
+from ptcc_certify.report.facts.input import limits_text
 from ptcc_certify.report.facts.interval_words import interval_text
 from ptcc_certify.report.text_layout import (
     TEXT,
@@ -58,6 +60,25 @@ def assumptions(certificate: Certificate) -> list[str]:
         "leaders at rest": certificate.proof.leaders_move,
     }
     return [text for text, holds in assumed.items() if holds]
+
+
+def beside_law(certificate: Certificate) -> list[str]:
+    """Tell in sentences what was asked for that the law, as it is displayed, leaves out: limits, late values."""
+    late, told = certificate.proof.late, []
+    limits = list(certificate.limits)
+    if late is not None:
+        messages = late.messages
+        if messages.age > 0:
+            whose = "and the own value" if messages.own_delay else "but not the own value"
+            told.append(
+                f"Here nothing is late; with late messages what is heard, {whose}, is up to {near(messages.age)} old."
+            )
+        if messages.gain_cap is not None and messages.vehicles is None and not limits:
+            limits = [Limits(gain_cap=messages.gain_cap)]
+    if limits:
+        each = "; or ".join(dict.fromkeys(map(limits_text, limits)))
+        told.append(f"Where limits are named, the gain g is limited: {each}.")
+    return told
 
 
 def claim_facts(certificate: Certificate) -> Facts:

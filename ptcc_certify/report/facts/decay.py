@@ -18,7 +18,7 @@ from ptcc_certify.errors import Change, Sentence, joined, labelled
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
 from ptcc_certify.report.facts.constrained_switching import TINY, TOO_SMALL, every_text
-from ptcc_certify.report.facts.input import limits_text
+from ptcc_certify.report.facts.input import limits_text, without_limits
 from ptcc_certify.report.facts.reported_times import SHORT, told_instants
 from ptcc_certify.report.text_layout import shorten_list
 from ptcc_certify.theorems.counterexample_text import mode_name
@@ -99,9 +99,9 @@ def error_facts(certificate: Certificate, drawn: bool, details: bool) -> Facts:
         standing: Standing = "proved" if limited or certificate.direct else "unproved"
         yield Fact(head="error", value=value, side="up", standing=standing, note=brief[0], brief=tuple(brief))
     if details and proof.rate is not None:
-        yield from instants_facts(certificate)
+        yield from without_limits(certificate, instants_facts(certificate))
         if certificate.initial_state is not None and not drawn and any(V.deviation for V in proof.functions):
-            yield from _deviation_facts(certificate)
+            yield from without_limits(certificate, _deviation_facts(certificate))
 
 
 def _error_texts(certificate: Certificate) -> tuple[Fraction | float, str, str, str]:
@@ -114,7 +114,7 @@ def _error_texts(certificate: Certificate) -> tuple[Fraction | float, str, str, 
         entry, *others = proof.effort.residual
         noise = "" if entry.noise is None else f", |n_k| <= {down(entry.noise, 12)}"
         size = entry.noisy_norm or entry.norm
-        norm = f"{limits_text(entry)}{noise}: ||E|| <= {up(size, 2)} at T"
+        norm = f"{limits_text(entry.limits)}{noise}: ||E|| <= {up(size, 2)} at T"
         agents = "" if entry.agents is None or entry.noisy_norm else f", every agent within {up(max(entry.agents), 2)}"
         return size, norm, agents, f"; ... {len(others) + 1} limits in all" if others else ""
     if proof.rate is None or (not certificate.direct and certificate.initial_state is None):

@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from fractions import Fraction
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.certificate.fact import Fact, Facts, Standing
-from ptcc_certify.errors import labelled
+from ptcc_certify.errors import joined, labelled
 from ptcc_certify.report.facts.constrained_switching import every_text
 from ptcc_certify.report.text_layout import TEXT, agent_text, shorten_list, value_list
 
 if TYPE_CHECKING:
     from ptcc_certify.bounds.input.effort import Effort, Limited
     from ptcc_certify.certificate.certificate import Certificate
-    from ptcc_certify.checker.input_formulas import InitialSet
+    from ptcc_certify.checker.input_formulas import InitialSet, Limits
+
+
+def without_limits(certificate: Certificate, facts: Iterable[Fact]) -> Facts:
+    """Say of facts of the law without limits that they are of it, where limits were asked for."""
+    for fact in facts:
+        yield replace(fact, note=joined("", ("without limits: ", fact.note))) if certificate.limits else fact
 
 
 def input_facts(certificate: Certificate, details: bool) -> Facts:
@@ -27,8 +35,7 @@ def input_facts(certificate: Certificate, details: bool) -> Facts:
     yield _input_fact(certificate, effort)
     if not details:
         return
-    yield from threshold_facts(certificate)
-    yield from _size_facts(certificate, effort)
+    yield from without_limits(certificate, chain(threshold_facts(certificate), _size_facts(certificate, effort)))
     yield from _limited_facts(effort)
 
 
@@ -77,7 +84,7 @@ def threshold_facts(certificate: Certificate) -> Facts:
         below = f" <= {up(upper, 5)}" if upper is not None and effort.by == "upper_bound" else " = 1 or less"
         enough = "" if certificate.proof.rate is None else f" to {up(2 / certificate.proof.rate, 5)} or more"
         text = f"rho2 kappa min Re lambda{below}, 1 is needed: raise rho2 kappa{enough}"
-        text = f"NOT BOUNDED without limits: {text}" if certificate.limits else text
+        text = f"NOT BOUNDED: {text}" if certificate.limits else text
     else:
         text = f"{product}, 1 is needed"
     told = None if effort.bounded is False or product not in text else lower
@@ -124,7 +131,7 @@ def _limited_facts(effort: Effort) -> Facts:
     for entry in effort.residual:
         agents = "" if entry.agents is None else f", every agent within {up(max(entry.agents), 3)} of its final state"
         largest = "" if entry.largest is None else f", |u_k| <= {up(entry.largest, 4)}"
-        text = f"{limits_text(entry)}: ||E|| <= {up(entry.norm, 3)} at T{agents}{largest}"
+        text = f"{limits_text(entry.limits)}: ||E|| <= {up(entry.norm, 3)} at T{agents}{largest}"
         yield Fact(head="limited", value=entry.norm, side="up", note=text, detail=True)
         if entry.noise is not None and entry.noisy_norm is not None and entry.noisy_largest is not None:
             noise = f"noise |n_k| <= {near(entry.noise)} leaves ||E|| <= {up(entry.noisy_norm, 3)} at T"
@@ -132,9 +139,8 @@ def _limited_facts(effort: Effort) -> Facts:
             yield Fact(head="limited", value=entry.noisy_norm, side="up", note=text, detail=True)
 
 
-def limits_text(entry: Limited) -> str:
+def limits_text(limits: Limits) -> str:
     """Name the limits of the gain."""
-    limits = entry.limits
     names = (("gain <= ", limits.gain_cap), ("switched off at T - ", limits.stop_before))
     return ", ".join(f"{what}{near(x)}" for what, x in (*names, ("zero-order hold ", limits.sample_period)) if x)
 
