@@ -1029,6 +1029,64 @@ def test_what_is_several_graphs_or_no_number_in_memory_is_refused_in_one_line():
         ptcc.as_family([(1, 2.0, 1, 2), (2, 1.0, -1, 0)])
 
 
+def test_rows_of_intervals_may_hold_a_weight_alone_or_a_node_alone(tmp_path):
+    text = "source,target,weight,weight_min,weight_max,year\na,b,3,,,1\nb,a,1,1,2,2\nc,,,,,3\n"
+    table = pd.read_csv(io.StringIO(text))
+    families = read_family(put(tmp_path, "g.csv", text)), ptcc.as_family(table)
+    for family in families:
+        assert family.labels == ("a", "b", "c") and {"1 node without edges: c"} <= {*family.notes}
+        assert 'columns ignored: "year"' in family.notes
+        assert sorted(family.modes[0].edge_interval(k) for k in (0, 1)) == [(1, 2), (3, 3)]
+    numbers = pd.DataFrame({"source": [1, 2, 3], "target": [2, 1, None], "min": [1, 2, None], "max": [2, 3, None]})
+    assert ptcc.as_family(numbers).labels == ("1", "2", "3")
+
+
+def test_all_that_is_wrong_with_intervals_is_one_message(tmp_path):
+    text = "source,target,weight,weight_min,weight_max\na,a,,1,2\nb,a,1,,2\nb,c,1,0,\nc,a,,2,1\nc,b,,,\na,b,,0,0\n"
+    says = (
+        ("self-loop at node a", "one end of its interval is missing", "the least weight 2 is above the largest"),
+        ("always 0",),
+    )
+    with pytest.raises(FormatError) as of_file:
+        read_family(put(tmp_path, "g.csv", text))
+    with pytest.raises(GraphError) as of_table:
+        ptcc.as_family(pd.read_csv(io.StringIO(text)))
+    for part in sum(says, ()):
+        assert part in str(of_file.value) and part in str(of_table.value)
+    assert "--drop" not in str(of_table.value) and "row 1 of the DataFrame: self-loop" in str(of_table.value)
+
+
+def test_one_end_of_intervals_is_told_and_a_column_called_max_is_ignored(tmp_path):
+    with pytest.raises(FormatError, match="one end of the intervals is named alone"):
+        read_family(put(tmp_path, "g.csv", "source,target,weight_min\na,b,1\n"))
+    text = "source,target,weight,max\na,b,1,3\n"
+    assert 'columns ignored: "max"' in read_graph(put(tmp_path, "g.csv", text)).read["notes"]
+    assert ptcc.as_family(pd.read_csv(io.StringIO(text))).graph == ptcc.as_graph([("a", "b", 1)])
+    assert ptcc.as_family(nx.DiGraph([("a", "b", {"weight": 1, "max": 3})])).graph == ptcc.as_graph([("a", "b", 1)])
+
+
+def test_quoted_titles_in_a_comment_are_noticed(tmp_path):
+    with pytest.raises(FormatError, match="a comment names the columns"):
+        read_graph(put(tmp_path, "g.csv", '# "target" "source" "weight"\n1 2 3\n'))
+    assert read_graph(put(tmp_path, "g.csv", '# "source" "target" "weight"\n1 2 3\n')).n_edges == 1
+
+
+def test_a_minus_beside_nothing_may_be_a_sign(tmp_path):
+    edge = '<edge source="{}" target="{}" weight="1"{}/>'
+    edges = edge.format("a", "b", ' label="-"') + edge.format("b", "a", "")
+    nodes = '<nodes><node id="a"/><node id="b"/></nodes>'
+    gexf = f'<gexf><graph defaultedgetype="{{}}">{nodes}<edges>{{}}</edges></graph></gexf>'
+    with pytest.raises(FormatError, match="are these signs"):
+        read_graph(put(tmp_path, "g.gexf", gexf.format("directed", edges)))
+    with pytest.raises(FormatError, match='edges of type "mutual" means undirected'):
+        read_graph(put(tmp_path, "g.gexf", gexf.format("mutual", edge.format("a", "b", ""))))
+
+
+def test_an_empty_list_of_pajek_is_no_relation(tmp_path):
+    graph = read_graph(put(tmp_path, "g.net", '*Vertices 2\n*Arcs :1 "a"\n1 2 1\n*Arcs :2 "b"\n'))
+    assert graph.n_edges == 1
+
+
 def test_a_row_that_is_a_comment_is_told_above_all_others_too(tmp_path):
     graph = read_graph(put(tmp_path, "g.csv", "#1,b,1\nb,#1,-1\n"))
     assert graph.read["notes"] == ("ignored as a comment: #1,b,1",)

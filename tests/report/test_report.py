@@ -794,7 +794,10 @@ def test_bounds_without_the_limits_of_the_gain_are_told_so(more: dict[str, Any],
         tmp_path / "c.json"
     )
     page = sound(report_html(read_certificate(tmp_path / "c.json"))).text
-    assert page.count("without limits") >= 2 and "names no limits, noise or disturbances is without them" in page
+    details = {fact.head: fact.text for fact in read_certificate(tmp_path / "c.json").facts() if fact.detail}
+    told = [details[head] for head in ("deviation", "threshold", "effort", "error")]
+    assert all(text.startswith("without limits: ") for text in told)
+    assert page.count("without limits") >= 6 and "names no limits, noise or disturbances is without them" in page
     assert ("left open: limits (" in page) == bool(more)
     assert ("gain \u2264 3: \u2016E\u2016" in page) != bool(more)
 
@@ -912,6 +915,10 @@ def test_latex_says_of_claim_bound_and_ends_what_they_are_without(parts: Any, wi
     bound = next(line for line in text.splitlines() if "very initial state" in line)
     ends = next(line for line in text.splitlines() if "The table tells where agents end" in line)
     assert all(f", {without}" in line for line in (claim, bound, ends))
+    law = text.partition("where $w_{kl}")[2].partition("The stretched clock")[0]
+    assert ("Here nothing is late" in law) == ("messages" in parts)
+    capped = not vehicles and ("a gain cap" in without or "limits" in parts)
+    assert ("the gain $g$ is limited: gain $\\le 30$" in law) == capped
     assert ("z_{k}(t) \\to" in claim) == vehicles == ("x_{k}(t) \\to" not in claim)
     assert (r"$\dot x_{k}(0)$" in text and "$-5$" in text) == vehicles
     assert ("Initial velocity" in report_html(saved)) == vehicles == ("v(0) " in "\n".join(certificate_lines(saved)))

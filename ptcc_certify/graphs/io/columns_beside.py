@@ -98,8 +98,8 @@ def verdict(title: str, values: Sequence[str]) -> Verdict:
         if None not in words.values():
             return Verdict("words" if letters or 1 in words.values() else "doubt", minus[0], True)
         rest = {text for text, word in words.items() if word is None}
-        if letters and (1 in words.values() or signed or rest <= {*_UNKNOWN}):
-            return Verdict("doubt", letters[0], True)
+        if rest <= {""} or (letters and (1 in words.values() or signed or rest <= {*_UNKNOWN})):
+            return Verdict("doubt", (letters or minus)[0], True)
     if set(texts) <= {*_NO, *_YES}:
         polar = _YES if re.search(_MINUS, written) else _NO if signed else ()
         mixed = set(texts).isdisjoint(_NO) is False if re.search(_SIGNED, written) else True

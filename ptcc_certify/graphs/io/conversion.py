@@ -9,15 +9,17 @@ from typing import Any
 
 import numpy as np
 
+from lmi.exact.decimal_rounding import counted
 from ptcc_certify.errors import FormatError, GraphError, ParameterError, did_you_mean
 from ptcc_certify.graphs.digraph import SignedDigraph, graph_of, refuse_networkx
 from ptcc_certify.graphs.family import Family, read_share
-from ptcc_certify.graphs.io.columns_beside import column_of, signs_beside_intervals
+from ptcc_certify.graphs.io.columns_beside import column_of, notes_on_ignored, signs_beside_intervals
 from ptcc_certify.graphs.io.family_files import read_family
 from ptcc_certify.graphs.io.graph_files import read_as
-from ptcc_certify.graphs.io.interval_edges import TWICE, Entry, told_weights
-from ptcc_certify.graphs.io.interval_rows import is_family_file
+from ptcc_certify.graphs.io.interval_edges import TWICE, Entry, absent, told_weights
+from ptcc_certify.graphs.io.interval_rows import IntervalRows, is_family_file, take
 from ptcc_certify.graphs.io.packaged import GRAPHS, file_or_packaged
+from ptcc_certify.graphs.io.problems import Problems, one_message
 from ptcc_certify.graphs.io.raw_edges import Beside, Nodes, Rows, Signs, distinct, rows_of
 from ptcc_certify.graphs.io.signs import interval_columns, is_sign
 from ptcc_certify.graphs.io.table_columns import BY_HEADER, RATERS, columns_of, edge_columns
@@ -246,9 +248,9 @@ def as_family(family: Any, orientation: str | None = None, *, uncertainty: Any =
         return Family.switching(alone)
     if isinstance(family, str | os.PathLike) and (family in GRAPHS or os.path.exists(family)):  # noqa: PTH110
         return read_family(file_or_packaged(os.fspath(family)), uncertainty=uncertainty, orientation=orientation)
-    if (edges := _interval_edges(family, uncertainty)) is not None:
-        nodes = family.nodes if hasattr(family, "is_multigraph") else ()
-        return Family.from_intervals(edges, nodes, orientation=orientation or "information")
+    if (rows := _interval_rows(family, uncertainty)) is not None:
+        made = Family.from_intervals(rows.edges, rows.nodes, orientation=orientation or "information")
+        return replace(made, notes=(*made.notes, *rows.notes))
     return Family.from_graph(as_graph(family, orientation), uncertainty=uncertainty)
 
 
@@ -277,7 +279,7 @@ def is_family(graphs: Any) -> bool:
         return graphs.graph is None
     if isinstance(graphs, str | os.PathLike):
         return os.path.isfile(graphs) and is_family_file(graphs)  # noqa: PTH113 - Path.is_file may raise
-    return isinstance(graphs, Mapping) or _is_list_of_graphs(graphs) or _interval_edges(graphs) is not None
+    return isinstance(graphs, Mapping) or _is_list_of_graphs(graphs) or _interval_rows(graphs) is not None
 
 
 def _is_list_of_graphs(graphs: Any) -> bool:
@@ -292,7 +294,7 @@ def _is_list_of_graphs(graphs: Any) -> bool:
     )
 
 
-def _interval_edges(graphs: Any, uncertainty: Any = 0) -> list[tuple[Any, Any, Any, Any]] | None:
+def _interval_rows(graphs: Any, uncertainty: Any = 0) -> IntervalRows | None:
     """Return the edges of a DataFrame or networkx graph with intervals, or of a list of edges with four entries.
 
     None of others.
@@ -301,18 +303,27 @@ def _interval_edges(graphs: Any, uncertainty: Any = 0) -> list[tuple[Any, Any, A
         intervals = bool(graphs) and all(isinstance(row, tuple) and len(row) == 4 for row in graphs)
         if intervals and read_share(uncertainty):
             raise ParameterError(TWICE)
-        return [*graphs] if intervals else None
+        return IntervalRows([], [*graphs]) if intervals else None
     if hasattr(graphs, "is_multigraph"):
-        entries = _entries_of_networkx(graphs)
+        told = _entries_of_networkx(graphs)
     elif hasattr(graphs, "columns") and hasattr(graphs, "to_numpy"):
-        entries = _entries_of_table(graphs)
+        told = _entries_of_table(graphs)
     else:
         return None
-    share = read_share(uncertainty)
-    return None if entries is None else [entry.interval(share) for entry in entries]
+    if told is None:
+        return None
+    rows, entries = told
+    broken = Problems()
+    take(rows, entries, Reading(), read_share(uncertainty), broken)
+    if problems := [problem.by_hand for problem in broken.told()]:
+        raise GraphError(": ".join(filter(None, one_message(problems, " ".join))))
+    return rows
 
 
-def _entries_of_table(table: Any) -> list[Entry] | None:
+_Told = tuple[IntervalRows, list[tuple[str, Entry]]]
+
+
+def _entries_of_table(table: Any) -> _Told | None:
     names = [str(name) for name in table.columns]
     low, high, may_fail = interval_columns(names, "the DataFrame")
     ends = edge_columns(names, "the DataFrame")
@@ -322,22 +333,37 @@ def _entries_of_table(table: Any) -> list[Entry] | None:
         raise GraphError("the DataFrame names no weight; name a column weight, or weight_min and weight_max")
     if low is not None and ends[2] is not None and is_sign(names[ends[2]]):
         ends = (*ends[:2], None)  # a column of signs, or of directions
+    read = (*ends, low, high, may_fail)
     m = len(table)
-    rest = [
-        [absent] * m if k is None else list(table[table.columns[k]])
-        for k, absent in ((ends[2], None), (low, None), (high, None), (may_fail, False))
-    ]
-    others = [k for k in range(len(names)) if k not in (*ends, low, high, may_fail)]
-    beside = [column_of(names[k], table[table.columns[k]]) for k in others]
+    columns = [[None] * m if k is None else list(table[table.columns[k]]) for k in read]
+    columns[:2] = map(_whole_numbers, columns[:2])
     if low is None and ends[2] is not None:
-        rest[0] = told_weights(rest[0], names[ends[2]])
-    if text := signs_beside_intervals(beside, zip(*rest[:3], strict=True)):
+        columns[2] = told_weights(columns[2], names[ends[2]])
+    others = [k for k in range(len(names)) if k not in read]
+    beside = [column_of(names[k], table[table.columns[k]]) for k in others]
+    if text := signs_beside_intervals(beside, zip(*columns[2:5], strict=True)):
         raise GraphError(f"the DataFrame: {text}")
-    at = [list(table[table.columns[k]]) for k in ends[:2]] + rest
-    return [Entry(f"row {row} of the DataFrame", *entry) for row, entry in enumerate(zip(*at, strict=True), 1)]
+    nodes, entries = dict[Any, bool](), list[tuple[str, Entry]]()  # nodes with edges, and without
+    for row, (source, target, *values) in enumerate(zip(*columns, strict=True), 1):
+        if absent(target) and all(map(absent, values)):  # a node, or nothing
+            nodes |= {} if absent(source) else {source: nodes.get(source, False)}
+        else:
+            nodes |= {source: True, target: True}
+            place = f"edge {shorten(str(source))} -> {shorten(str(target))}"
+            entries.append((f"row {row} of the DataFrame", Entry(place, source, target, *values)))
+    alone = [str(node) for node, there in nodes.items() if not there]
+    notes = (f"{counted(len(alone), 'node')} without edges: {first_five(alone)}",) if alone else ()
+    return IntervalRows([*nodes], notes=(*notes, *notes_on_ignored(beside))), entries
 
 
-def _entries_of_networkx(graph: Any) -> list[Entry] | None:
+def _whole_numbers(nodes: list[Any]) -> list[Any]:
+    """Return nodes that pandas made floats since one is missing as the integers that they were."""
+    there = [node for node in nodes if not absent(node)]
+    floats = len(there) < len(nodes) and all(isinstance(node, float) and node.is_integer() for node in there)
+    return [None if absent(node) else int(node) for node in nodes] if floats else nodes
+
+
+def _entries_of_networkx(graph: Any) -> _Told | None:
     edges = [data for *_, data in graph.edges(data=True)]
     titles = list(dict.fromkeys(title for data in edges for title in data if isinstance(title, str)))
     columns = interval_columns(titles, "the graph")
@@ -345,10 +371,11 @@ def _entries_of_networkx(graph: Any) -> list[Entry] | None:
         return None
     refuse_networkx(graph)
     read = ["weight", *(None if k is None else titles[k] for k in columns)]
-    values = lambda title, absent: [absent if title is None else data.get(title, absent) for data in edges]  # noqa: E731
-    told = [values(title, absent) for title, absent in zip(read, (None, None, None, False), strict=True)]
+    values = lambda title, missing: [missing if title is None else data.get(title, missing) for data in edges]  # noqa: E731
+    told = [values(title, None) for title in read]
     beside = [column_of(title, values(title, "")) for title in titles if title not in read]
     if text := signs_beside_intervals(beside, zip(*told[:3], strict=True)):
         raise GraphError(f"the graph: {text}")
     places = [(f"edge {shorten(str(u))} -> {shorten(str(v))}", u, v) for u, v in graph.edges()]
-    return [Entry(*place, *one) for place, one in zip(places, zip(*told, strict=True), strict=True)]
+    entries = [("", Entry(*place, *one)) for place, one in zip(places, zip(*told, strict=True), strict=True)]
+    return IntervalRows([*graph.nodes], notes=notes_on_ignored(beside)), entries

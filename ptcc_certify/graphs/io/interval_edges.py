@@ -19,6 +19,17 @@ TWICE = "the edges give intervals themselves; leave out the uncertainty"
 Interval = tuple[Any, Any, Fraction, Fraction]
 
 
+def absent(value: Any) -> bool:
+    """Tell whether a value says nothing: None, NaN and NA of pandas, and a text of blanks.
+
+    Examples
+    --------
+    >>> absent(" "), absent(float("nan")), absent(0)
+    (True, True, False)
+    """
+    return value is None or (not value.strip() if isinstance(value, str) else str(value) in ("nan", "<NA>", "NaT"))
+
+
 class Entry(NamedTuple):
     """An edge as it is told: where it stands, its ends, its weight or an interval, and whether it may fail."""
 
@@ -39,7 +50,7 @@ class Entry(NamedTuple):
         >>> Entry("row 1", "a", "b", None, "0.0", "0", None).always_zero
         True
         """
-        told = [end for end in (self.weight, self.least, self.largest) if end is not None and str(end).strip()]
+        told = [end for end in (self.weight, self.least, self.largest) if not absent(end)]
         try:
             return bool(told) and not any(as_fraction(end, "weight") for end in told)
         except (NumberError, TypeError, ValueError):
@@ -62,13 +73,15 @@ class Entry(NamedTuple):
             if isinstance(node, str) and not node.strip():
                 raise GraphError(f"{self.place}: the {end} is empty; name the {end} or remove the row")
             refuse_unnamed(node, self.place)
-        single = self.least is None and self.largest is None
+        single = absent(self.least) and absent(self.largest)
         if not single and share:
             raise ParameterError(TWICE)
         ends = (self.weight, self.weight) if single else (self.least, self.largest)
-        if None in ends:
+        if single and absent(self.weight):
             raise GraphError(f"{self.place}: it has no weight; give weight, or weight_min and weight_max")
-        text = str(self.optional).strip().lower()
+        if any(map(absent, ends)):
+            raise GraphError(f"{self.place}: one end of its interval is missing; give weight_min and weight_max")
+        text = "" if absent(self.optional) else str(self.optional).strip().lower()
         if text not in (*_YES, *_NO):
             raise GraphError(f"{self.place}: optional is {shorten(str(self.optional))}; write yes or no")
         least, largest = read_interval(*ends, self.place)

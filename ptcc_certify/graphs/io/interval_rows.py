@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import chain
@@ -169,6 +169,20 @@ class _Edges(EdgeList):
         self.ends = (*self.ends, *({table.columns[1], weight} - {None, self.ends[2]}))
         self.beside = [(k, column) for k, column in self.beside if k not in (weight, *table.columns)]
 
+    def read(self, rows: Iterable[tuple[int, list[str]]]) -> None:
+        """Read all rows; the weight of a row stands for both ends of its interval where these are empty."""
+        low, high, _ = self.columns_told
+        weight = self.weight
+        if low is None or high is None or weight is None:
+            return super().read(rows)
+
+        def with_ends(row: list[str]) -> list[str]:
+            if max(low, high, weight) < len(row) and not (row[low].strip() or row[high].strip()):
+                row = [row[weight] if k in (low, high) else text for k, text in enumerate(row)]
+            return row
+
+        return super().read((number, with_ends(row)) for number, row in rows)
+
     def entries(self, how: Reading) -> list[tuple[str, Entry]]:
         """Return the edges as they are told, each with its line."""
         kept, labels = self.kept or [], [*self.nodes.texts]
@@ -229,7 +243,7 @@ def take(
                 mend = "--undirected makes each row both directions; keep one, or leave out --undirected"
             broken.add(Problem(place, f"second row for edge {_text(pair)} (the first is {seen[again]})", mend))
             continue
-        seen[pair] = place
+        seen[pair] = place or "an earlier one"
         rows.edges.append(edge)
 
 

@@ -202,4 +202,5 @@ def read_gexf(data: bytes, name: str, how: Reading) -> Rows:
         rows = attribute_rows(labels, ends, attributes, name, how, rest)
         timed = any(_TIMES & {*one.keys()} for one in graphs[0].iter())
         rows.notes = (TIMES,) if timed or graphs[0].find(".//spells") is not None else ()
-        return both_ways(rows, undirected, 'edges of type "undirected"', how)
+        kinds = {edge.get("type", kind) for edge in graphs[0].iter("edge")} - {"directed"}
+        return both_ways(rows, undirected, f'edges of type "{shorten(" or ".join(sorted(kinds)))}"', how)

@@ -57,6 +57,7 @@ def read_pajek(data: bytes, name: str, how: Reading) -> Rows:
     if not networks:
         raise FormatError(f"{name}: {_FORM}")
     network = networks[0]
+    network.sections = [section for section in network.sections if section.lines] or network.sections[:1]
     relations = dict.fromkeys(section.relation for section in network.sections)
     if len(relations) > 1:
         wanted = _chosen({one: one for one in relations}, "relations", name, how)

@@ -18,6 +18,11 @@ class Problem:
     mend: str  # {} stands for the option, if there is one
     option: str = ""
 
+    @property
+    def by_hand(self) -> Problem:
+        """The same where no options are: rows in memory."""
+        return replace(self, mend=self.mend.partition(", or ")[0], option="") if self.option else self
+
 
 class Problems:
     """Rules that rows break: of each the first row, and how many rows there are.

@@ -132,11 +132,13 @@ def interval_columns(first: Sequence[str], place: str) -> tuple[int | None, int 
     >>> interval_columns(["source", "target", "weight_min", "weight_max"], "a.csv")
     (2, 3, None)
     """
+    if not family_titles(first):
+        return None, None, None
     low, high, may_fail = (find(first, names, place) for names in (_LEAST, _LARGEST, _OPTIONAL))
     if sum(plain(title) in map(plain, _OPTIONAL) for title in first) > 1:
         raise FormatError(f"{place}: two columns tell whether edges may fail; leave one out")
     if (low is None) != (high is None):
-        raise FormatError(f"{place}: names one end of the intervals; name weight_min and weight_max")
+        raise FormatError(f"{place}: one end of the intervals is named alone; name weight_min and weight_max")
     return low, high, may_fail
 
 

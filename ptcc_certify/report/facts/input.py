@@ -16,7 +16,7 @@ from ptcc_certify.report.facts.constrained_switching import every_text
 from ptcc_certify.report.text_layout import TEXT, agent_text, shorten_list, value_list
 
 if TYPE_CHECKING:
-    from ptcc_certify.bounds.input.effort import Effort, Limited
+    from ptcc_certify.bounds.input.effort import Effort
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.checker.input_formulas import InitialSet, Limits
 
