@@ -190,7 +190,7 @@ class _Draft:
         if not self.name:
             return "write 1 and -1, or name the weight: weight=, of a table columns="
         tell = ", or name the columns of source, target and weight: --columns a,b,w"
-        return f"write 1 and -1{tell if self.rows.columns else ''}"
+        return f"write 1 and -1{tell if self.rows.beside.may_be_told else ''}"
 
     def parsed(self, weight: Any, code: int) -> Fraction:
         """Read a weight exactly, or name the first edge that has it."""

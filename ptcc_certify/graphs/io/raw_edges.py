@@ -39,6 +39,7 @@ class Beside:
     signs: Signs | None = None
     columns: Sequence[Column] = ()  # what is not read
     told: bool = False  # were the columns told, so that those beside them say nothing?
+    may_be_told: bool = True  # columns, or the attribute of weights
 
 
 @dataclass
@@ -59,7 +60,6 @@ class Rows:
     notes: tuple[str, ...] = ()
     problems: Sequence[Problem] = ()  # what is wrong with rows that are left out
     asks: str = ""  # why the direction must be told
-    columns: bool = True  # may columns, or the attribute of weights, be told?
 
 
 class Numbers(dict[str, int]):

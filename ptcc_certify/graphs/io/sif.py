@@ -33,7 +33,7 @@ def read_sif(data: bytes, name: str, how: Reading) -> Rows:
         for target in fields[2:]:
             draft.add(source, draft.nodes[target], fields[1], number)
     rows = draft.rows()
-    rows.beside.title, rows.columns = "relation", False
+    rows.beside.title, rows.beside.may_be_told = "relation", False
     return rows
 
 
