@@ -91,6 +91,10 @@ def error_facts(certificate: Certificate, drawn: bool, details: bool) -> Facts:
         invariant = "its state" if certificate.direct else "x - sigma"
         yield Fact(head="error", note=f"none: no agent listens to another, each keeps {invariant}")
         return
+    end = proof.final_positions
+    if certificate.direct and end is not None and end.exact and tuple(proof.initial_positions or ()) == end.states:
+        yield Fact(head="error", note="none: every agent begins at its final state")
+        return
     value, norm, agents, more = _error_texts(certificate)
     if norm:
         limited = proof.effort is not None and bool(proof.effort.residual)  # from the whole set
