@@ -32,10 +32,12 @@ from ptcc_certify.errors import Change, Sentence, spell
 from ptcc_certify.graphs.io.graph_files import reading_flags
 from ptcc_certify.model.agents import plant_text
 from ptcc_certify.report import html_text as texts
-from ptcc_certify.report.facts.claim import assumptions, beside_law
+from ptcc_certify.report.facts.agents import claimed_of
+from ptcc_certify.report.facts.claim import assumptions
 from ptcc_certify.report.facts.constrained_switching import signal_text
 from ptcc_certify.report.facts.decay import BOUND_KINDS
 from ptcc_certify.report.facts.graph import leader_facts
+from ptcc_certify.report.facts.law import beside_law
 from ptcc_certify.report.facts.of_certificate import facts_of
 from ptcc_certify.report.html_text import rational
 from ptcc_certify.report.page_figures import Counterexamples, counterexamples, draw, inline_figure, run_of_agents
@@ -252,6 +254,7 @@ def _title(saved: Certificate) -> Markup:
     text = Markup("{} at {} = {}").format(behaviour, deadline, rational(saved.protocol.T)).replace("= \u2248", "\u2248")
     if saved.proof.agents is not None:
         text = Markup("{} of {}").format(behaviour, plant_text(saved.proof.agents.protocol.plant))
+        text += claimed_of(saved.proof.agents).replace(" - ", " \N{MINUS SIGN} ")
     elif saved.proof.constant:
         text = Markup("every agent keeps {}").format("its state" if saved.direct else "x \u2212 \u03c3")
     if saved.proof.agents is None:

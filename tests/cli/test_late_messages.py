@@ -567,11 +567,11 @@ def test_late_messages_and_leaders_that_move_from_certify_to_page() -> None:
     assert "nothing late, leaders at rest" in text and "x(T)" not in text and "met: within 9 at T" in text
     assert ptcc("check", "both.json").code == 0
     verbose = " ".join(ptcc("certify", "team.csv", *words, "-v").out.split())
-    assert "given nothing late and leaders at rest, in what follows" in verbose
+    assert "given nothing late, leaders at rest, without disturbances, in what follows" in verbose
     assert "|u_k| <=" in " ".join(ptcc("certify", "team.csv", *words, "--gain-cap", "9").out.split())
     for name, said in (
-        ("both.html", "nothing late and leaders at rest, in what follows"),
-        ("both.tex", "nothing late and leaders at rest, in what follows"),
+        ("both.html", "nothing late, leaders at rest, without disturbances, in what follows"),
+        ("both.tex", "nothing late, leaders at rest, without disturbances, in what follows"),
     ):
         assert ptcc("report", "both.json", "-o", name).code == 0
         assert said in Path(name).read_text(encoding="utf-8")

@@ -89,3 +89,43 @@ def test_what_holds_from_the_deadline_on_holds_at_it():
     for largest, after, at in ((0.025, 0.0195, "0.02"), (0.0095, 0.0195, "0.0095")):
         late.largest, late.after = largest, after
         assert _within_text(late, 2) == f"every follower within {at} of its target at T, within 0.02 from then on"
+
+
+def told(certificate: ptcc.Certificate, head: str) -> list[str]:
+    return [fact.text for fact in certificate.facts() if fact.head == head]
+
+
+def test_what_is_told_of_other_agents_or_another_law_says_so(tmp_path: Path):
+    led = [("lead", "a", 1), ("a", "b", 1), ("b", "a", -1)]
+    law, asks = ptcc.NominalProtocol(), ptcc.Asks(simulation=False)
+    moving = ptcc.certify(led, law, [1, 3, -2], leaders=ptcc.MovingLeaders("0.5", "0.2", "0.9"), asks=asks)
+    disturbed = ptcc.certify(led, law, [1, 3, -2], asks=ptcc.Asks(simulation=False, delta="0.5"))
+    for certificate in (moving, disturbed):
+        assert all("without disturbances" in told(certificate, head)[0] for head in ("claim", "x(T)"))
+    assert told(moving, "given") == ["leaders at rest, without disturbances, without sign(e_k), in what follows"]
+    assert not told(disturbed, "given")
+    pages = {}
+    for name, certificate in (("moving", moving), ("disturbed", disturbed)):
+        certificate.save(tmp_path / f"{name}.json")
+        ptcc.write_report(tmp_path / f"{name}.json", tmp_path / f"{name}.html")
+        pages[name] = (tmp_path / f"{name}.html").read_text("utf-8")
+    assert "no disturbances in the model" not in pages["moving"] and "of those that move was asked" in pages["moving"]
+    assert "without disturbances</h1>" in pages["disturbed"]
+
+
+def test_agents_of_order_n_are_not_single_integrators_and_end_at_their_places(tmp_path: Path):
+    path = [("a", "b", 1), ("b", "a", 1)]
+    start, asks = ptcc.InitialState([1, 2], v0=[0, 1]), ptcc.Asks(simulation=False)
+    law = ptcc.NominalProtocol(kappa=3)
+    capped = ptcc.certify(path, law, start, agents=ptcc.Agents(order=2, gain_cap=20), asks=asks)
+    assert told(capped, "rate")[0].startswith("of single integrators: ")
+    assert all("without the cap" in text for head in ("x(T)", "v(T)") for text in told(capped, head))
+    formed = ptcc.certify(path, law, start, agents=ptcc.Agents(order=2, offsets=[0, 1]), asks=asks)
+    assert told(formed, "error")[0].endswith("of their places in the common motion")
+    for name, certificate, says in (
+        ("capped", capped, "But for what the cap leaves: All agents"),
+        ("formed", formed, "Of x \N{MINUS SIGN} offsets: All agents"),
+    ):
+        certificate.save(tmp_path / f"{name}.json")
+        ptcc.write_report(tmp_path / f"{name}.json", tmp_path / f"{name}.html")
+        assert says in (tmp_path / f"{name}.html").read_text("utf-8")

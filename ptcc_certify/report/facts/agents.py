@@ -81,7 +81,7 @@ def _final_facts(part: AgentsAnswer) -> Facts:
             continue
         kind = f"({_accuracy(ends)}{', at rest' if rest and i == 0 else ''}{open_end})"
         note, brief = (_ends_text(part, ends, width - columns(kind) - 1) for width in (12 * TEXT, 2 * TEXT))
-        if i == 0 and part.protocol.gain_cap is not None:
+        if part.protocol.gain_cap is not None:
             kind = f"{kind[:-1]}; without the cap)"
         head = _ENDS[i] if i < len(_ENDS) else f"x^({i})(T)"
         yield Fact(head=head, value=ends, note=f"{note} {kind}", brief=(f"{brief} {kind}",))
@@ -112,23 +112,28 @@ def _accuracy(ends: Sequence[Sequence[Interval]]) -> str:
     return "rounded" if cut or widest else "exact"
 
 
-def _named(bounds: Sequence[float]) -> str:
+def _motion(part: AgentsAnswer) -> str:
+    """Name what agents are near to."""
+    return "their places in the common motion" if part.formation else "the common motion"
+
+
+def _named(bounds: Sequence[float], part: AgentsAnswer) -> str:
     """Tell bounds of positions, velocities and so on."""
     words = []
     for i, bound in enumerate(bounds):
         name = PLURALS[i] if i < len(PLURALS) else f"derivatives {i}"
         words.append(f"{name} within {up(bound, 2)}")
-    return ", ".join(words) + " of the common motion"
+    return ", ".join(words) + f" of {_motion(part)}"
 
 
 def _error_text(part: AgentsAnswer) -> str:
     """Tell how near agents are to the common motion at ``0.99 T``, or at ``T`` under a cap."""
     if part.residual is not None:
-        return "at T " + _named([float(max(row[i] for row in part.residual.agents)) for i in range(part.order)])
+        return "at T " + _named([float(max(row[i] for row in part.residual.agents)) for i in range(part.order)], part)
     bounds = part.deviation_bound(np.array([0.01]))[:, :, 0].max(axis=0)
     if not np.isfinite(bounds).all():
         return f"at 0.99 T deviations are {up(part.fall(0.01) * (1 + 1e-9), 2)} of {part.first_ones}, in the norm of V"
-    return "at 0.99 T " + _named(bounds.tolist())
+    return "at 0.99 T " + _named(bounds.tolist(), part)
 
 
 def _input_fact(part: AgentsAnswer) -> Fact:
@@ -154,7 +159,7 @@ def _deviation_facts(part: AgentsAnswer) -> Facts:
         if np.isfinite(worst).all():
             bounds = ", ".join(f"{up(float(x), 2)} at {name}" for x, (_, name) in zip(worst, _INSTANTS, strict=True))
             name = DERIVATIVES[i] if i < len(DERIVATIVES) else f"derivative {i}"
-            yield Fact(head="deviation", note=f"{name}: from the common motion at most {bounds}", detail=True)
+            yield Fact(head="deviation", note=f"{name}: from {_motion(part)} at most {bounds}", detail=True)
 
 
 def claimed_of(part: AgentsAnswer) -> str:

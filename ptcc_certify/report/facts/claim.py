@@ -11,13 +11,11 @@ import numpy as np
 from lmi.exact.decimal_rounding import counted, down, near
 from ptcc_certify.certificate.constrained_switching.claims import LastModeClaim
 from ptcc_certify.certificate.fact import Fact, Facts
-from ptcc_certify.checker.input_formulas import Limits
 from ptcc_certify.errors import labelled
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.structure import BIPARTITE_CONTAINMENT, STABILITY, Structure
 from ptcc_certify.report.facts.agents import claimed_of
 from ptcc_certify.report.facts.constrained_switching import RESTS, of_mode
-from ptcc_certify.report.facts.input import limits_text
 from ptcc_certify.report.facts.interval_words import interval_text
 from ptcc_certify.report.text_layout import (
     TEXT,
@@ -37,6 +35,7 @@ if TYPE_CHECKING:
     from ptcc_certify.bounds.final_state.attracting_box import AttractingBox
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.checker.reading import Interval
+    from ptcc_certify.model.late_messages import LateMessages
 
 #: Components of which a screen tells, and lines of a text on the short one.
 _COMPONENTS, _LINES = 4, 3
@@ -48,9 +47,21 @@ DRIVEN = "ends at x(0) - sigma(0)"
 WHATEVER = {"any": "for every signal", "constant": "if mode and weights never change"}
 
 
+def asked_messages(certificate: Certificate) -> LateMessages | None:
+    """Return the late messages of which something is told."""
+    return None if certificate.proof.late is None else certificate.proof.late.messages
+
+
+def undisturbed(certificate: Certificate) -> bool:
+    """Tell whether disturbances were asked about that what is told is without, but for facts that name them."""
+    leaders = certificate.proof.asked_leaders
+    asked = certificate.delta is not None or (leaders is not None and leaders.disturbance > 0)
+    return asked and certificate.protocol.reaching is None
+
+
 def assumptions(certificate: Certificate) -> list[str]:
     """Tell what claim, final state, rate and error are without, where more was asked."""
-    messages = None if certificate.proof.late is None else certificate.proof.late.messages
+    messages, leaders = asked_messages(certificate), certificate.proof.asked_leaders
     virtual = messages is not None and messages.vehicles is not None
     assumed = {
         "without limits": bool(certificate.limits),
@@ -58,27 +69,10 @@ def assumptions(certificate: Certificate) -> list[str]:
         "without a gain cap": not certificate.limits and messages is not None and messages.gain_cap is not None,
         "nothing late": messages is not None and not (virtual and messages.exact),
         "leaders at rest": certificate.proof.leaders_move,
+        "without disturbances": undisturbed(certificate),
+        "without sign(e_k)": leaders is not None and leaders.sign_gain is not None,
     }
     return [text for text, holds in assumed.items() if holds]
-
-
-def beside_law(certificate: Certificate) -> list[str]:
-    """Tell in sentences what was asked for that the law, as it is displayed, leaves out: limits, late values."""
-    late, told = certificate.proof.late, []
-    limits = list(certificate.limits)
-    if late is not None:
-        messages = late.messages
-        if messages.age > 0:
-            whose = "and the own value" if messages.own_delay else "but not the own value"
-            told.append(
-                f"Here nothing is late; with late messages what is heard, {whose}, is up to {near(messages.age)} old."
-            )
-        if messages.gain_cap is not None and messages.vehicles is None and not limits:
-            limits = [Limits(gain_cap=messages.gain_cap)]
-    if limits:
-        each = "; or ".join(dict.fromkeys(map(limits_text, limits)))
-        told.append(f"Where limits are named, the gain g is limited: {each}.")
-    return told
 
 
 def claim_facts(certificate: Certificate) -> Facts:

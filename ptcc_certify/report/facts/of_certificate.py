@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from lmi.exact.decimal_rounding import near
 from ptcc_certify.certificate.assessment import rejects
 from ptcc_certify.certificate.fact import Fact, Facts
+from ptcc_certify.errors import joined
 from ptcc_certify.report.facts.agents import agents_facts
 from ptcc_certify.report.facts.claim import assumptions, claim_facts, family_claims
 from ptcc_certify.report.facts.constrained_switching import signal_facts
@@ -98,7 +99,8 @@ def _of_graph(certificate: Certificate, details: bool, beside: bool) -> Facts:
     elif not drawn:
         yield from _details(final_facts(certificate), certificate.proof.leaders_move)
     if details:
-        yield from rate_facts(certificate)
+        of = "" if certificate.proof.agents is None else "of single integrators: "
+        yield from (replace(fact, note=joined("", (of, fact.note))) for fact in rate_facts(certificate))
     if certificate.proof.agents is None and (details or not beside):
         yield from _details(error_facts(certificate, drawn, details), beside)
         yield from _details(input_facts(certificate, details), beside)
@@ -121,7 +123,9 @@ def _of_family(certificate: Certificate, details: bool, beside: bool) -> Facts:
 def _beside(certificate: Certificate) -> list[Fact]:
     """Tell what the rest of a certificate knows nothing of: nothing, or one fact."""
     without = [text for text in assumptions(certificate) if text != "without limits"]
-    text = f"{' and '.join(without)}, in what follows"
+    if without == ["without disturbances"]:  # what these add is told in a fact of its own
+        return []
+    text = f"{', '.join(without)}, in what follows"
     return [Fact(head="given", note=text, detail=True)] if without else []
 
 

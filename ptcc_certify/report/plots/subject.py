@@ -174,7 +174,10 @@ def limits_text(run: Trajectory, certificate: Certificate | None) -> str:
     numbers |= {} if messages is None else {"messages late by up to": messages.age, "off by": messages.value_error}
     named = ["vehicles"] * run.vehicles
     named += [f"{name} {near(number)}" for name, number in numbers.items() if number]
-    named += [] if leaders is None else [f"leaders move at up to {near(leaders.speed)}"]
+    if leaders is not None:
+        values = leaders.speed, leaders.disturbance, leaders.sign_gain
+        words = dict(zip(("leaders move at up to", "disturbed by up to", "with sign(e) times"), values, strict=True))
+        named += [f"{name} {near(number)}" for name, number in words.items() if number]
     if certificate is not None:
         vehicles = run.vehicles
         forced = certificate.sigma0 is None and met.forcing is None and leaders is None
