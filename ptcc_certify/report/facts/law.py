@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def beside_law(certificate: Certificate) -> list[str]:
-    """Tell in sentences what was asked for that the law, as it is displayed, leaves out: limits, late values, leaders that move, noise."""
+    """Tell in sentences what was asked for that the displayed law leaves out: limits, late values, moving leaders."""
     messages, leaders, told = asked_messages(certificate), certificate.proof.asked_leaders, list[str]()
     limits = list(certificate.limits)
     if messages is not None:
