@@ -65,6 +65,7 @@ def assumptions(certificate: Certificate) -> list[str]:
     virtual = messages is not None and messages.vehicles is not None
     assumed = {
         "without limits": bool(certificate.limits),
+        "without noise": certificate.noise is not None,
         "of virtual positions": virtual,
         "without a gain cap": not certificate.limits and messages is not None and messages.gain_cap is not None,
         "nothing late": messages is not None and not (virtual and messages.exact),
