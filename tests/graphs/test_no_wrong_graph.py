@@ -759,6 +759,7 @@ NODES_AND_COMMENTS = [
             ("0>1", ('{"id": "a"}', '{"name": "b"}')),
         ]
     ),
+    Input("g.json", named_nodes('null>"1"', *ONE_TWO_THREE), says=("link 1 has no source",)),
     Input("g.txt", "0 1 2\n1\n2\n", says=("lists of neighbours",)),
     Input("g.txt", "#adjlist\n0 1 2 3\n1 2 3\n2\n3\n", says=("lists of neighbours",)),
     Input("g.txt", "0 1 2\n3\n4\n", "0>1=2"),

@@ -317,7 +317,7 @@ def _refuse_ambiguous(draft: EdgeList, rows: Rows, data: bytes, konect: bool) ->
     if alone and rows.labels[0] in (str(len(labels) - 1), str(len(draft.first))):
         what = f"{rows.labels[0]} is the number of nodes or edges, or a node without edges? Leave the first row out"
         raise FormatError(f"{name}: {what}, or begin with a header source,target,weight")
-    if _counts(draft):
+    if not konect and _counts(draft):
         what = "are numbers of nodes and of edges, or an edge? Leave this row out"
         raise FormatError(f"{name}, line {draft.lines[0]}: the first two fields {what}, or {tell}")
     extra = dict[str, int]() if konect else draft.extra

@@ -44,7 +44,8 @@ def read_json(data: bytes, name: str, how: Reading) -> Rows:
         raise FormatError(f"{name}: nodes or {found[0]} of the JSON are no lists of objects; {_FORM}")
     if document.get("directed", True) not in (True, False):
         raise FormatError(f"{name}: directed is neither true nor false; write one")
-    labels, number = _nodes(nodes, [one.get(end) for one in links for end in ("source", "target")], name)
+    told = [one.get(end) for one in links for end in ("source", "target")]
+    labels, number = _nodes(nodes, [end for end in told if isinstance(end, str)], name)
     ends = []
     for k, one in enumerate(links, 1):
         source, target = (_end(one, end, k, labels, number, bool(nodes), name) for end in ("source", "target"))
@@ -64,7 +65,7 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return dict(pairs)
 
 
-def _nodes(nodes: list[Any], ends: list[Any], name: str) -> tuple[list[str], dict[str, int]]:
+def _nodes(nodes: list[Any], ends: list[str], name: str) -> tuple[list[str], dict[str, int]]:
     """Return the labels of the nodes, and their positions by what links call them."""
     if not all(isinstance(one, dict) for one in nodes):
         identifiers = [str(one) for one in nodes]
@@ -83,12 +84,12 @@ def _nodes(nodes: list[Any], ends: list[Any], name: str) -> tuple[list[str], dic
     return names_or_identifiers(identifiers, attributes), number
 
 
-def _named(nodes: list[dict[str, Any]], ends: list[Any], name: str) -> tuple[list[str], dict[str, int]]:
+def _named(nodes: list[dict[str, Any]], ends: list[str], name: str) -> tuple[list[str], dict[str, int]]:
     """Return the labels of nodes without an id that links call by name, and their positions by these."""
     found = list[list[str]]()
     for title in _NAMES:
         names = [text_of(one, title) for one in nodes]
-        if all(names) and len(set(names)) == len(names) and set(names) >= {str(end) for end in ends}:
+        if all(names) and len(set(names)) == len(names) and set(names) >= set(ends):
             found += [names] if names not in found else []
     if len(found) != 1 or any(isinstance(end, _Integer) for end in ends):
         mend = "give each node its own id, and name the ends of links by these"
