@@ -782,6 +782,7 @@ NODES_AND_COMMENTS = [
             "follower,leader,weight",
             "target,regulator,effect",
             "i j a_ij",
+            "i,j,w(i,j)",
             "rater ratee rating",
             "Gene TF Mode",
             "user followee trust",

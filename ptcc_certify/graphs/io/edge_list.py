@@ -293,7 +293,7 @@ def _refuse_titles_of_comments(data: bytes, name: str, width: int) -> None:
     for line in data[:2000].decode("utf-8", "replace").removeprefix("\ufeff").splitlines():
         if line.strip()[:1] not in "#%":
             break
-        titles = [title.strip("\"'") for title in re.split(r"\s*[,;\t ]\s*", line.strip(" \t#%"))]
+        titles = [title.strip("\"'") for title in re.split(r"\s*[,;\t ](?![^(]*\))\s*", line.strip(" \t#%"))]
         if len(titles) != width or len(set(map(plain, titles))) < width:
             continue
         if turns_edges(titles, name):
