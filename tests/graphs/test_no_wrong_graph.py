@@ -280,7 +280,7 @@ ORDINARY = [
         "2>1=4 3>2=-4",
         how={"orientation": "listens"},
     ),
-    Input("g.csv", "source,target,Trust\n1,2,4\n2,3,-4\n", says=("line 1", '"Trust"')),
+    Input("g.csv", "source,target,Trust\n1,2,4\n2,3,-4\n", "1>2=4 2>3=-4"),
     *(
         Input("g.txt", table, says=("line 2", "4 fields", "row.names = FALSE"))
         for table in (
@@ -688,10 +688,131 @@ ROWS_AND_MATRICES = [
     ),
     Input("g.mtx", "%%MatrixMarket matrix array real general\n2 2\n0 0.0e5\n-1e-300 -0\n", f"2>1=-1/{10**300}"),
 ]
+UNDIRECTED = ("#undirected", "  # Undirected graph", "# directed=False", "# Undirected network of allies")
+#: Words for signs as titles and in rows, and rows that lack them.
+TITLES_AND_WORDS = [
+    Input("g.csv", "source,target,weight,sign\na,b,NA,\n", says=("line 2", 'edge a -> b has no "sign"')),
+    Input("g.csv", "source,target,sign,weight\na,b,1,2\nb,a,x,\n", says=("line 3", "edge b -> a has no weight")),
+    Input("g.csv", "source,target,trust\nann,bob,trust\nbob,carl,distrust\n", "ann>bob=1 bob>carl=-1"),
+    Input("g.csv", "source,target,trust\nann,bob,5\nbob,carl,-3\n", "ann>bob=5 bob>carl=-3"),
+    Input("g.csv", "target,activation,source\na,5,b\nb,-3,c\n", "b>a=5 c>b=-3"),
+    Input("g.csv", "source,target,5\ntarget,bob,-3\n", "source>target=5 target>bob=-3"),
+    *(
+        Input("g.csv", f"{header}\na,b,{rest}\n", says=("line 1", "names no weight", "--columns"))
+        for header, rest in [
+            ("source,target,inhibition", "5"),
+            ("source,target,+", "-"),
+            ("source,target,score", "5"),
+            ("from,to,support,year", "1,1999"),
+        ]
+    ),
+    Input("g.csv", "SourceGene,TargetGene,Activator\na,b,activates\nb,c,inhibits\n", "a>b=1 b>c=-1"),
+    Input("g.csv", "target,influencer,trust\na,b,trust\nb,c,distrust\n", "b>a=1 c>b=-1"),
+    Input("g.csv", "follower,leader,trust\na,b,trust\nb,c,distrust\n", says=("line 1", "--edges listens")),
+    Input("g.csv", "gene1,gene2,activates\ngene2,gene3,inhibits\n", "gene1>gene2=1 gene2>gene3=-1"),
+    Input("g.csv", "source,target,sign,type\na,b,1,activates\nb,c,1,inhibits\n", says=("line 3", "disagree")),
+    Input("g.csv", "source,target,sign,type\na,b,1,activates\nb,c,-1,inhibits\n", "a>b=1 b>c=-1"),
+    Input("g.csv", "source,target,weight,type\na,b,1,activates\nb,c,2,activates\n", "a>b=1 b>c=2"),
+    Input("g.csv", "source,target,weight,type\na,b,1,1\nb,c,2,1\n", says=("no -1",)),
+    Input("g.csv", "source,target,mor\na,b,0.5\nb,c,-1\n", "a>b=1/2 b>c=-1"),
+    Input("g.csv", "source,target,mor\na,b,2\nb,c,-1\n", says=("codes of relations",)),
+    *(
+        Input("g.csv", f"a,b,{plus}\nb,c,{minus}\n", "a>b=1 b>c=-1")
+        for plus, minus in [
+            ("excitatory", "inhibitory"),
+            ("excites", "Inhibitory"),
+            ("excitation", "-"),
+            ("upregulated", "downregulated"),
+            ("cooperation", "conflict"),
+        ]
+    ),
+    Input("g.csv", "source,target,weight,excites\na,b,2,no\nb,c,1,yes\n", says=("excites", "are these signs")),
+    Input("g.csv", ",,\nsource,target,weight\na,b,2\nb,a,-1\n", "a>b=2 b>a=-1"),
+    Input("g.csv", ";;\na;b;2\nb;a;-1\n", "a>b=2 b>a=-1"),
+    Input("g.sif", "A\tactivates\tB\t0.5\n", says=("line 1", "0.5 is a score")),
+    Input("g.sif", "1\t-1\t2\t3\n", "1>2=-1 1>3=-1"),
+]
+
+
+def named_nodes(links: str, *nodes: str) -> str:
+    """Write nodes without an id, and links between them."""
+    ends = "".join(links.split()).split(",")
+    edges = [f'{{"source": {one}, "target": {other}, "value": -1}}' for one, other in (end.split(">") for end in ends)]
+    return f'{{"nodes": [{",".join(nodes)}], "links": [{",".join(edges)}]}}'
+
+
+ONE_TWO_THREE = '{"name": "1"}', '{"name": "2"}', '{"name": "3"}'
+#: Nodes of JSON by position and by name, lists of neighbours, counts, printed matrices, corners and comments.
+NODES_AND_COMMENTS = [
+    Input("g.json", named_nodes('"1">"2"', *ONE_TWO_THREE), "1>2=-1"),
+    Input("g.json", named_nodes("1>2", *ONE_TWO_THREE), "2>3=-1"),
+    Input("g.json", named_nodes('"a">"b"', '{"label": "a"}', '{"label": "b"}'), "a>b=-1"),
+    Input("g.json", named_nodes("0>1", '{"name": null}', '{"name": "b"}'), "0>1=-1"),
+    *(
+        Input("g.json", named_nodes(links, *nodes), says=("its own id",))
+        for links, nodes in [
+            ('"1">2', ONE_TWO_THREE),
+            ('"1">"4"', ONE_TWO_THREE),
+            ('"1">"2"', ('{"name": "1"}', '{"name": "2"}', '{"name": null}')),
+            ('"1">"2"', ('{"name": "1"}', '{"name": "2"}', '{"name": "2"}')),
+            ('"1">"2"', ('{"name": "1", "label": "2"}', '{"name": "2", "label": "1"}')),
+            ("0>1", ('{"id": "a"}', '{"name": "b"}')),
+        ]
+    ),
+    Input("g.json", named_nodes('null>"1"', *ONE_TWO_THREE), says=("link 1 has no source",)),
+    Input("g.txt", "0 1 2\n1\n2\n", says=("lists of neighbours",)),
+    Input("g.txt", "#adjlist\n0 1 2 3\n1 2 3\n2\n3\n", says=("lists of neighbours",)),
+    Input("g.txt", "0 1 2\n3\n4\n", "0>1=2"),
+    Input("g.txt", "4 3 1\n1 2 5\n2 3 -7\n3 4 1\n", says=("line 1", "numbers of nodes and of edges", "--columns")),
+    Input("g.txt", "4 3 -1\n1 2 5\n2 3 -7\n3 4 1\n", "4>3=-1 1>2=5 2>3=-7 3>4=1"),
+    Input("g.txt", "  (0, 1) 0.5\n  (1, 0) -1.0\n", says=("(0,", "sparse matrix", ".npz")),
+    *(
+        Input("g.csv", f"{corner},a,b\na,0,2\nb,-1,0\n", edges, says, how)
+        for corner in ("source", "from", "Regulator", "leader", "from\\to", "source/target", "Source Gene")
+        for edges, says, how in [
+            ("", ("line 1", "the corner", "--edges information"), {}),
+            ("a>b=2 b>a=-1", (), {"orientation": "information"}),
+        ]
+    ),
+    *(Input("g.csv", f"{corner},a,b\na,0,2\nb,-1,0\n", "b>a=2 a>b=-1") for corner in ("target", "to\\from", "gene")),
+    Input("g.csv", "from b\nfrom 0 2\nb -1 0\n", "b>from=2 from>b=-1"),
+    *(
+        Input("g.txt", f"# {titles}\n1 2 3\n2 3 -1\n", says=("a comment names the columns", "--columns"))
+        for titles in (
+            "follower,leader,weight",
+            "target,regulator,effect",
+            "i j a_ij",
+            "i,j,w(i,j)",
+            "rater ratee rating",
+            "Gene TF Mode",
+            "user followee trust",
+        )
+    ),
+    *(
+        Input("g.txt", f"# {prose}\n1 2 3\n2 3 -1\n", "1>2=3 2>3=-1")
+        for prose in ("made by me", "gene1 gene2 effect", "to start with", "converted from undirected data")
+    ),
+    *(Input("g.txt", f"{line}\n1 2 3\n2 3 -1\n", says=(line.strip(), "--undirected")) for line in UNDIRECTED),
+    *(
+        Input("g.txt", f"{line}\n1 2 3\n2 3 -1\n", "1>2=3 2>3=-1")
+        for line in ("# directed=True", "# undirected: no", "# undirectedness was removed")
+    ),
+]
+#: Laplacians as edges, with the sums over those who are heard or who listen.
+HEARD = "1,1,3\n2,2,1\n3,3,1\n1,2,-1\n1,3,-2\n2,1,-1\n3,2,1\n"
+LISTEN = "1,1,3\n2,2,1\n3,3,1\n2,1,-1\n3,1,-2\n1,2,-1\n2,3,1\n"
+LAPLACIANS_OF_EDGES = [
+    Input("g.csv", LISTEN, "2>1=1 3>1=2 1>2=1 2>3=-1", how={"laplacian": True}),
+    Input("g.csv", HEARD, says=("over edges of one source", "--edges listens"), how={"laplacian": True}),
+    Input("g.csv", HEARD, "2>1=1 3>1=2 1>2=1 2>3=-1", how={"laplacian": True, "orientation": "listens"}),
+]
 INPUTS = [
     *(SIGNS + UNKNOWN_SIGNS + DIRECTIONS + SIGNS_BESIDE + ORDINARY + LAPLACIANS + ROWS + MATRICES + FORMATS + OTHERS),
     *NUMBERS_AND_ATTRIBUTES,
     *ROWS_AND_MATRICES,
+    *TITLES_AND_WORDS,
+    *NODES_AND_COMMENTS,
+    *LAPLACIANS_OF_EDGES,
 ]
 
 
@@ -807,6 +928,39 @@ def test_a_laplacian_in_memory_is_named_and_read():
         assert told(graph) == expected(OF_LAPLACIAN)
         assert (graph.laplacian().toarray() == LAPLACIAN).all()
         assert ptcc.as_graph(matrix, "listens", laplacian=True) == graph
+
+
+def test_a_laplacian_of_edges_in_memory_is_to_be_given_as_a_matrix():
+    edges = [tuple(row.split(",")) for row in LISTEN.split()]
+    for graph in (edges, nx.DiGraph([(a, b, {"weight": w}) for a, b, w in edges])):
+        with pytest.raises(GraphError, match="give the matrix with laplacian=True, or leave the self-loops out"):
+            ptcc.as_graph(graph)
+    table = pd.DataFrame([row.split(",") for row in HEARD.split()], columns=["source", "target", "weight"])
+    with pytest.raises(GraphError, match='Say orientation="listens"'):
+        ptcc.as_graph(table, laplacian=True)
+
+
+def test_titles_of_a_table_in_memory_are_read_as_those_of_a_file():
+    ends = {"source": ["ann", "bob"], "target": ["bob", "carl"]}
+    assert told(ptcc.as_graph(pd.DataFrame(ends | {"trust": ["trust", "distrust"]}))) == expected(
+        "ann>bob=1 bob>carl=-1"
+    )
+    for title, says in (("inhibition", "names no weight"), (7, "is no graph; name them source, target, weight")):
+        with pytest.raises(GraphError, match=says):
+            ptcc.as_graph(pd.DataFrame(ends | {title: [1, 2]}))
+
+
+def test_the_name_of_a_relation_of_pajek_is_told(tmp_path):
+    for name, notes in (("trust", ('relation "trust"',)), ("", ())):
+        content = NET + f'*Arcs :1 "{name}"\n1 2 1\n*Edges :1 "{name}"\n2 3 1\n'
+        read = read_graph(put(tmp_path, "g.net", content)).read["notes"]
+        assert read == (*notes, "*Edges go both ways (1)")
+
+
+@pytest.mark.parametrize("comment", ["#metoo b 1", " #metoo,b,1", "\t%a;b;-1"])
+def test_comments_between_blanks_or_indented_that_look_like_rows_are_told(tmp_path, comment):
+    graph = read_graph(put(tmp_path, "g.txt", f"a b 1\n{comment}\n#read in May 2020\nb a -1\n"))
+    assert graph.read["notes"] == (f"ignored as a comment: {comment.strip()}",)
 
 
 def test_edges_in_memory_take_what_the_flags_say():

@@ -26,6 +26,12 @@ def lower_case(attributes: Attributes) -> dict[str, Any]:
     return {str(key).lower(): value for key, value in attributes.items()}
 
 
+def text_of(attributes: Attributes, title: str) -> str:
+    """Return an attribute as a text; "" where it is not there or is null."""
+    value = lower_case(attributes).get(title)
+    return "" if value is None else str(value).strip()
+
+
 def names_or_identifiers(identifiers: Sequence[str], nodes: Sequence[Attributes]) -> list[str]:
     """Return what nodes are called: by ``label`` or ``name`` where identifiers only number them, as igraph's n0, n1.
 
@@ -38,7 +44,7 @@ def names_or_identifiers(identifiers: Sequence[str], nodes: Sequence[Attributes]
     """
     if all(re.fullmatch(r"n?[0-9]+", node) for node in identifiers):
         for title in ("label", "name"):
-            names = [str(lower_case(node).get(title, "")).strip() for node in nodes]
+            names = [text_of(node, title) for node in nodes]
             if names and all(names) and len(set(names)) == len(names):
                 return names
     return list(identifiers)

@@ -26,7 +26,7 @@ _MINUS = (
     r"down(regul|$)|disagree"
 )
 _PLUS = (
-    r"pos(itive|$)|activat|promot|stimul|induc|^all(y|ies|iance)|friend|(?<!dis)trust|(?<!dis)like(?!li)|plus|"
+    r"pos(itive|$)|activat|excit|promot|stimul|induc|^all(y|ies|iance)|friend|(?<!dis)trust|(?<!dis)like(?!li)|plus|"
     r"(?<!dis)agree|upregul"
 )
 _SIGNED = r"(?<!de)(?<!as)sign(?!if|al)|sgn|polarity|valence|attitude|stance|effect|mode$"
@@ -183,6 +183,11 @@ def notes_on_ignored(columns: Iterable[Column]) -> tuple[str, ...]:
 def is_signed(title: str) -> bool:
     """Tell whether a title is one of signs, in other words than those that are read."""
     return re.search(_SIGNED, plain(title)) is not None
+
+
+def is_size(title: str) -> bool:
+    """Tell whether a title is one of weights, in other words than those that are read."""
+    return re.search(_SIZES, plain(title)) is not None
 
 
 def directions(title: str, values: Sequence[str]) -> list[str]:

@@ -22,7 +22,7 @@ from ptcc_certify.graphs.io.packaged import GRAPHS, file_or_packaged
 from ptcc_certify.graphs.io.problems import Problems, one_message
 from ptcc_certify.graphs.io.raw_edges import Beside, Nodes, Rows, Signs, distinct, rows_of
 from ptcc_certify.graphs.io.signs import interval_columns, is_sign
-from ptcc_certify.graphs.io.table_columns import BY_HEADER, RATERS, columns_of, edge_columns
+from ptcc_certify.graphs.io.table_columns import BY_HEADER, RATERS, Columns, columns_of, edge_columns
 from ptcc_certify.graphs.labels import first_five, labels_beside
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
@@ -135,13 +135,14 @@ def _rows_of_table(table: Any, how: Reading) -> Rows | None:
     names = [str(name) for name in table.columns]
     if set(labels_beside(table) or ()) == set(names):
         return None  # an adjacency matrix
-    if not how.titles and edge_columns(names, "the DataFrame") is None:
+    named = bool(how.titles) or edge_columns(names, "the DataFrame") is not None
+    columns = columns_of(names, [], "the DataFrame", how) if named else Columns()
+    if not columns.titles and not columns.told:
         raise GraphError(
             f"a DataFrame with the columns {first_five(names)} is no graph; name them source, target, weight, tell "
             'them: columns="a,b,w", or give an adjacency matrix with the same labels on rows and columns'
         )
     how.refuse("variable", "the DataFrame", "a table of edges")
-    columns = columns_of(names, [], "the DataFrame", how)
     if not columns.titles:
         columns = replace(columns, titles=tuple(names))
     nodes, ends = Nodes(), []

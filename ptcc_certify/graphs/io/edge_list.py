@@ -18,7 +18,7 @@ from ptcc_certify.graphs.io.files import lines_of
 from ptcc_certify.graphs.io.problems import Problem, Problems, one_message
 from ptcc_certify.graphs.io.raw_edges import DECIMALS, HEADER_MEND, Beside, Draft, Numbers, Rows, Signs
 from ptcc_certify.graphs.io.signs import WEIGHT, plain, sign_of_word
-from ptcc_certify.graphs.io.table_columns import Columns, columns_of, edge_columns, names_edges
+from ptcc_certify.graphs.io.table_columns import Columns, asks_of_corner, columns_of, names_edges, turns_edges
 from ptcc_certify.graphs.io.text_matrices import bracketed_matrix, is_entry, table_as_matrix
 from ptcc_certify.graphs.labels import first_five, ordered_labels
 from ptcc_certify.graphs.rationals import parse_exact, shorten
@@ -48,6 +48,8 @@ def records(data: bytes, name: str) -> Iterator[tuple[int, list[str]]]:
             continue
         if line.lstrip()[:1] in "#%":  # the empty text is in every text
             continue
+        if not detected and not line.strip(" ,;\t"):
+            continue  # empty fields above all others
         try:
             if not detected:
                 separator, detected = _separator(line)
@@ -105,6 +107,7 @@ def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
     table = [row for _, row in begin if len(row) > 1]
     tells = bool(how.titles) or bool(table and names_edges(table[0]))
     konect = re.match(rb"(\xef\xbb\xbf)?%\s*(sym|asym)\b", data) is not None  # nodes, weight and time
+    started = next((number for number, row in begin if len(row) > 1), 0)
     if (
         table and not tells and not konect and len(table[0]) >= len(table) - 1
     ):  # perhaps a matrix, of which all rows are needed
@@ -112,8 +115,9 @@ def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
         table = [row for _, row in begin if len(row) > 1]
         declares = any(len(row) == 1 and row[0].strip() for _, row in begin)
         if not declares and (matrix := table_as_matrix(table, name)) is not None:
+            if (corner := table[0][0].strip()) not in matrix.labels:
+                matrix.asks = asks_of_corner(corner, f"line {started}")
             return matrix
-    started = next((number for number, row in begin if len(row) > 1), 0)
     columns = columns_of(table[0], table[1:], f"{name}, line {started}", how) if table else Columns()
     if columns.titles:
         begin = [row for row in begin if row[0] != started]
@@ -141,14 +145,18 @@ def notes_on_comments(data: bytes) -> tuple[str, ...]:
     >>> notes_on_comments(b"#Gene1,Gene2,Score\na,b,1\n#b,a,2\n")
     ('ignored as a comment: #b,a,2',)
     """
-    found = re.findall(rb"^[#%][^\s#%,;].*[,;\t].*[,;\t].*$", data, re.MULTILINE)
-    fields = (re.split(rb"\s*[,;\t]\s*", line.strip())[1:] for line in found)
-    entries = (any(is_entry(one.decode("utf-8", "replace")) for one in some) for some in fields)
-    lines = [line for line, holds in zip(found, entries, strict=True) if holds]
+    found = re.findall(rb"^[ \t]*[#%][^\s#%,;].*$", data, re.MULTILINE)
+    lines = [line for line in found if _is_row_of_edges(line.decode("utf-8", "replace").strip())]
     if not lines:
         return ()
     rest = f" and {len(lines) - 1} more" if len(lines) > 1 else ""
     return (f"ignored as a comment: {shorten(lines[0].decode('utf-8', 'replace').strip())}{rest}",)
+
+
+def _is_row_of_edges(comment: str) -> bool:
+    """Tell whether a comment has three fields or more and a number, the third of those between blanks, or a sign."""
+    fields = re.split(r"\s*[,;\t]\s*", comment)
+    return any(map(is_entry, fields[1:])) if len(fields) > 2 else any(map(is_entry, comment.split()[2:3]))
 
 
 def direction_of_comments(data: bytes, name: str) -> str:
@@ -156,13 +164,14 @@ def direction_of_comments(data: bytes, name: str) -> str:
     for line in data[:2000].decode("utf-8", "replace").removeprefix("\ufeff").splitlines():
         if line.strip()[:1] not in "#%":
             break
-        if konect := re.match(r"%\s*(sym|asym|bip)\b", line):
+        if konect := re.match(r"\s*%\s*(sym|asym|bip)\b", line):
             if konect[1] == "bip":
                 mend = "give the nodes of each its own names, such as u1 and v1, and leave out this line"
                 raise FormatError(f"{name}, line 1: % bip: two sets of nodes share their numbers; {mend}")
             return "% sym" if konect[1] == "sym" else ""
-        if re.match(r"#\s*undirected graph\b", line, re.IGNORECASE):
-            return "# Undirected graph"
+        no = r"\s*[=:]\s*(false|no|0)\b"
+        if re.match(rf"\s*[#%]\s*(undirected\b(?!{no})|directed{no})", line, re.IGNORECASE):
+            return f"the comment {shorten(line.strip())}"
     return ""
 
 
@@ -175,7 +184,7 @@ class EdgeList(Draft):
         self.signs, self.sign_codes = Numbers(), list[int]()
         self.beside = [(k, Column(columns.titles[k])) for k in columns.ignored]
         self.kept: list[list[str]] | None = None  # the fields of every edge, where they are asked for
-        self.broken = Problems()
+        self.broken, self.declared = Problems(), list[int]()  # nodes of rows of one field
         self.ends: tuple[int | None, ...] = (columns.source, columns.target, columns.weight)  # and what tells weights
         self.extra: dict[str, int] = {}  # fields after the third of a table without header, and the line of each
 
@@ -189,6 +198,8 @@ class EdgeList(Draft):
             if len(row) > width and any(map(str.strip, row[width:])) and self.more_fields(number, row, width):
                 continue
             try:
+                if sign is not None and not (row[w].strip() and row[sign].strip()):
+                    raise LookupError  # before a weight is registered that no edge has
                 source, target, code = nodes[row[s]], nodes[row[t]], weights[row[w]]
                 if sign is not None:
                     self.sign_codes.append(signs[row[sign]])
@@ -221,7 +232,7 @@ class EdgeList(Draft):
         columns, titles = self.columns, self.columns.titles
         if len(row) < 2 or not any(row):
             if label := "".join(row):
-                _ = self.nodes[label]
+                self.declared.append(self.nodes[label])
             return
         field = lambda k: row[k] if k is not None and k < len(row) else ""  # noqa: E731
         source, target, *weights = map(field, self.ends)
@@ -277,16 +288,15 @@ def _refuse_titles(row: list[str], place: str, data: bytes) -> None:
 def _refuse_titles_of_comments(data: bytes, name: str, width: int) -> None:
     """Refuse rows without a header whose columns a comment names in another order, as numpy.savetxt writes it.
 
-    It has as many words as rows have fields, and one for each end and the weight; other comments are prose.
+    It has as many words as rows have fields, and one for an end and for the weight; other comments are prose.
     """
     for line in data[:2000].decode("utf-8", "replace").removeprefix("\ufeff").splitlines():
         if line.strip()[:1] not in "#%":
             break
-        titles = [title.strip("\"'") for title in re.split(r"\s*[,;\t ]\s*", line.strip(" \t#%"))]
+        titles = [title.strip("\"'") for title in re.split(r"\s*[,;\t ](?![^(]*\))\s*", line.strip(" \t#%"))]
         if len(titles) != width or len(set(map(plain, titles))) < width:
             continue
-        ends = edge_columns(titles, name)
-        if ends is not None and ends[2] is not None and ends[:2] != (0, 1):
+        if turns_edges(titles, name):
             mend = f"remove {line.strip()[0]} before {shorten(titles[0])}, or tell them: --columns 1,2,3"
             raise FormatError(f"{name}: a comment names the columns; {mend}")
 
@@ -302,10 +312,14 @@ def _refuse_ambiguous(draft: EdgeList, rows: Rows, data: bytes, konect: bool) ->
     if commas and b'"' not in data:
         which = "nodes, or a matrix, with decimal commas? Write decimals with a point, or quote the names of nodes"
         raise FormatError(f"{name}: {commas[0]} among {which}")
+    _refuse_printed(draft)
     alone = bool(draft.first) and 0 not in draft.first and 0 not in draft.second  # the first node
     if alone and rows.labels[0] in (str(len(labels) - 1), str(len(draft.first))):
         what = f"{rows.labels[0]} is the number of nodes or edges, or a node without edges? Leave the first row out"
         raise FormatError(f"{name}: {what}, or begin with a header source,target,weight")
+    if not konect and _counts(draft):
+        what = "are numbers of nodes and of edges, or an edge? Leave this row out"
+        raise FormatError(f"{name}, line {draft.lines[0]}: the first two fields {what}, or {tell}")
     extra = dict[str, int]() if konect else draft.extra
     if extra:
         _refuse_decimal_commas(data, name)
@@ -328,6 +342,27 @@ def _refuse_ambiguous(draft: EdgeList, rows: Rows, data: bytes, konect: bool) ->
     lists = nodes and not konect and len(set(draft.first)) == len(draft.first) > 2
     if lists and all(rows.labels[t] != rows.weights[w] for t, w in zip(draft.second, draft.codes, strict=True)):
         raise FormatError(f"{name}: a list of neighbours, or edges with weights that are nodes? Of edges, {tell}")
+
+
+def _refuse_printed(draft: EdgeList) -> None:
+    """Refuse what prints: a sparse matrix, whose rows begin ``(0, 1)``, and lists of neighbours of every node."""
+    if odd := [label for label in draft.nodes.texts if re.fullmatch(r"\(\d+,?", label)]:
+        what = f"a node called {shorten(odd[0])}: a sparse matrix that was printed? Save it as .mtx or .npz"
+        raise FormatError(f"{draft.name}: {what}; of edges, begin with a header source,target,weight")
+    begins = [*draft.first, *draft.declared]
+    every = len(begins) == len(draft.nodes.texts) == len(set(begins))
+    if draft.first and draft.declared and every and all(text in draft.nodes.texts for text in draft.weights.texts):
+        mend = "Write those with networkx.write_weighted_edgelist; of edges, begin with a header source,target,weight"
+        raise FormatError(f"{draft.name}: lists of neighbours, one of every node, or edges and nodes alone? {mend}")
+
+
+def _counts(draft: EdgeList) -> bool:
+    """Tell whether the first row may hold the numbers of nodes and of rows after it, which are more than one."""
+    labels, others = [*draft.nodes.texts], len(draft.first) - 1
+    if others < 2 or not [*draft.weights.texts][draft.codes[0]].isdigit():
+        return False
+    nodes = {*draft.first[1:], *draft.second[1:], *draft.declared}
+    return (labels[draft.first[0]], labels[draft.second[0]]) == (str(len(nodes)), str(others))
 
 
 def _is_sign(label: str) -> bool:

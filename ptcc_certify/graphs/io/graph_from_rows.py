@@ -289,12 +289,13 @@ class _Draft:
             self.undirected = self.undirected or (f'column "{title}"' if directions[0] else "")
             return
         factors = [self.factor(text, beside == code, title) for code, text in enumerate(texts)]
-        if (odd := code_among([*map(Fraction, factors)], signs.title)) is not None:
+        words = all(sign_of_word(text) is not None for text in texts)
+        if not words and (odd := code_among([*map(Fraction, factors)], signs.title)) is not None:
             what = f'column "{title}" holds {", ".join(map(str, sorted(factors)))} and no -1'
             self.refuse(int(np.argmax(beside == factors.index(int(odd)))), f"{what}; {self.columns_mend()}")
         pairs, which = np.unique(self.codes * len(texts) + beside, return_inverse=True)
         both = [(Fraction(self.values[p // len(texts)]), factors[p % len(texts)]) for p in pairs.tolist()]
-        if negative := any(weight < 0 for weight, _ in both):
+        if negative := bool(self.rows.beside.title) or any(weight < 0 for weight, _ in both):
             for k, (weight, factor) in enumerate(both):
                 if weight * factor < 0 or (weight < 0 and not factor):
                     edge = int(np.argmax(which == k))
@@ -336,6 +337,8 @@ class _Draft:
                 self.fail(self.name, f"{what}, or add {no} if these are self-loops")
             if found.laplacian and (self.rows.matrix or found.loops > 1):
                 what = "the diagonal holds the sums of the other entries, as a Laplacian's"
+                if not self.name and not self.rows.matrix:
+                    self.fail(self.name, f"{what}; give the matrix with laplacian=True, or leave the self-loops out")
                 no = "--no-laplacian" if self.name else "laplacian=False"
                 self.fail(
                     self.name, f"{what}; read it with {self.call('laplacian')}, or add {no} if these are self-loops"
@@ -355,10 +358,16 @@ class _Draft:
         if not (found.rows or found.columns or found.balanced_rows or found.balanced_columns):
             label = shorten(self.rows.labels[found.odd])
             self.fail(self.name, f"no Laplacian: the diagonal of row {label} is not the sum of magnitudes beside it")
-        by_columns = not (found.rows or found.balanced_rows)
-        if by_columns and self.how.orientation is None and self.name:
+        if self.how.orientation is not None:
+            return
+        if self.rows.matrix and self.name and not (found.rows or found.balanced_rows):
             what = "a Laplacian whose columns hold the sums: do columns listen?"
             self.fail(self.name, f"{what} Say --edges information, or --edges listens if rows do")
+        if not self.rows.matrix and not (found.columns or found.balanced_columns):  # sums of who is heard
+            say = "--edges {}" if self.name else 'orientation="{}"'
+            what = "a Laplacian with the sums over edges of one source: does the source listen?"
+            mend = f"Say {say.format('listens')}, or {say.format('information')} if the target does"
+            self.fail(self.name, f"{what} {mend}")
 
     def tell_self_loops(self, rows: np.ndarray) -> None:
         label = shorten(self.rows.labels[int(self.rows.first[rows[0]])])

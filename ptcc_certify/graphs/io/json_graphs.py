@@ -6,7 +6,7 @@ import json
 from typing import Any
 
 from ptcc_certify.errors import FormatError
-from ptcc_certify.graphs.io.attributes import attribute_rows, names_or_identifiers
+from ptcc_certify.graphs.io.attributes import attribute_rows, names_or_identifiers, text_of
 from ptcc_certify.graphs.io.files import decoded, one_line_errors
 from ptcc_certify.graphs.io.raw_edges import Rows
 from ptcc_certify.graphs.io.text_matrices import bracketed_matrix
@@ -14,17 +14,23 @@ from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
 
 _LINKS = ("links", "edges")
+#: What may name nodes that have no id.
+_NAMES = ("name", "label")
 _FORM = 'give {"directed": true, "nodes": [{"id": ..}], "links": [{"source": .., "target": .., "weight": ..}]}'
 
 
+class _Integer(str):
+    """An integer of JSON, as it is written: it may be the position of a node, and a text may not."""
+
+
 def read_json(data: bytes, name: str, how: Reading) -> Rows:
-    """Read node-link data, whose links may name nodes by ``id`` or, where there is none, by position from 0.
+    """Read node-link data, whose links may name nodes by ``id`` or, where there is none, by position from 0 or by name.
 
     Numbers are texts, so that they are read exactly. Links have a direction unless ``directed`` says false.
     """
     with one_line_errors(name, "JSON"):
         document = json.loads(
-            decoded(data, name), parse_float=str, parse_int=str, parse_constant=str, object_pairs_hook=_once
+            decoded(data, name), parse_float=str, parse_int=_Integer, parse_constant=str, object_pairs_hook=_once
         )
     if isinstance(document, list) and (matrix := bracketed_matrix(data, name)) is not None:
         return matrix
@@ -38,7 +44,8 @@ def read_json(data: bytes, name: str, how: Reading) -> Rows:
         raise FormatError(f"{name}: nodes or {found[0]} of the JSON are no lists of objects; {_FORM}")
     if document.get("directed", True) not in (True, False):
         raise FormatError(f"{name}: directed is neither true nor false; write one")
-    labels, number = _nodes(nodes, name)
+    told = [one.get(end) for one in links for end in ("source", "target")]
+    labels, number = _nodes(nodes, [end for end in told if isinstance(end, str)], name)
     ends = []
     for k, one in enumerate(links, 1):
         source, target = (_end(one, end, k, labels, number, bool(nodes), name) for end in ("source", "target"))
@@ -58,19 +65,36 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return dict(pairs)
 
 
-def _nodes(nodes: list[Any], name: str) -> tuple[list[str], dict[str, int]]:
+def _nodes(nodes: list[Any], ends: list[str], name: str) -> tuple[list[str], dict[str, int]]:
     """Return the labels of the nodes, and their positions by what links call them."""
     if not all(isinstance(one, dict) for one in nodes):
         identifiers = [str(one) for one in nodes]
         attributes: list[dict[str, Any]] = [{} for _ in nodes]
-    elif all("id" in one for one in nodes):
+    elif all(one.get("id") is not None for one in nodes):
         identifiers, attributes = [str(one["id"]) for one in nodes], nodes
+    elif any(one.get("id") is not None for one in nodes):
+        raise FormatError(f"{name}: some nodes have an id and others have none; give each its own id")
+    elif not all(isinstance(end, _Integer) for end in ends):
+        return _named(nodes, ends, name)
     else:
         identifiers, attributes = [str(k) for k in range(len(nodes))], nodes
     number = {one: k for k, one in enumerate(identifiers)}
     if len(number) < len(nodes):
         raise FormatError(f"{name}: two nodes have the same id; rename one")
     return names_or_identifiers(identifiers, attributes), number
+
+
+def _named(nodes: list[dict[str, Any]], ends: list[str], name: str) -> tuple[list[str], dict[str, int]]:
+    """Return the labels of nodes without an id that links call by name, and their positions by these."""
+    found = list[list[str]]()
+    for title in _NAMES:
+        names = [text_of(one, title) for one in nodes]
+        if all(names) and len(set(names)) == len(names) and set(names) >= set(ends):
+            found += [names] if names not in found else []
+    if len(found) != 1 or any(isinstance(end, _Integer) for end in ends):
+        mend = "give each node its own id, and name the ends of links by these"
+        raise FormatError(f"{name}: links call nodes by texts that are not the names of the nodes throughout; {mend}")
+    return found[0], {one: k for k, one in enumerate(found[0])}
 
 
 def _end(

@@ -33,6 +33,7 @@ class _Section:
 
     kind: str
     relation: str
+    named: bool  # or called by its number
     lines: list[Line] = field(default_factory=list)
 
 
@@ -70,7 +71,8 @@ def read_pajek(data: bytes, name: str, how: Reading) -> Rows:
         draft.read(section)
     rows = draft.rows()
     rows.beside.columns = [column_of("label", draft.tags)] if any(draft.tags) else []
-    rows.notes = ("lists without weights: each is 1",) if draft.lists else ()
+    rows.notes = tuple({f'relation "{shorten(section.relation)}"': 0 for section in network.sections if section.named})
+    rows.notes += ("lists without weights: each is 1",) if draft.lists else ()
     timed = any(re.search(r'(^|\s)\[[\d*,\s-]+\](?=[^"]*$)', row) for _, row in network.rows())
     rows.notes += (TIMES,) if timed or network.events else ()
     return both_ways(rows, draft.undirected, "*Edges", how)
@@ -109,7 +111,7 @@ def _networks(lines: Sequence[str], name: str) -> Iterator[_Network]:
             rows, read = network.nodes, True
             network.vertices = rest if kind == "vertices" else None
         elif kind in _LISTS and network.vertices is not None and relation:
-            section = _Section(kind, relation[2] or relation[3] or relation[1] or "1")
+            section = _Section(kind, relation[2] or relation[3] or relation[1] or "1", bool(relation[2] or relation[3]))
             network.sections.append(section)
             rows, read = section.lines, True
         elif kind in _BESIDE:

@@ -8,6 +8,7 @@ from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io.files import lines_of
 from ptcc_certify.graphs.io.raw_edges import Draft, Rows
 from ptcc_certify.graphs.io.signs import sign_of_word
+from ptcc_certify.graphs.io.text_matrices import is_number
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
 
@@ -29,6 +30,9 @@ def read_sif(data: bytes, name: str, how: Reading) -> Rows:
         if not all(fields) or len(fields) == 2:
             mend = "write a relation b: one source, one relation, then its targets"
             raise FormatError(f'{name}, line {number}: "{shorten(line.strip())}" is no row of SIF; {mend}')
+        if (score := next(filter(is_number, fields[3:]), "")) and not any(map(is_number, (fields[0], fields[2]))):
+            mend = "leave scores out, or write a table with a header source,target,sign,weight as .csv"
+            raise FormatError(f"{name}, line {number}: {shorten(score)} is a score, not a target; {mend}")
         source = draft.nodes[fields[0]]
         for target in fields[2:]:
             draft.add(source, draft.nodes[target], fields[1], number)

@@ -12,13 +12,15 @@ from ptcc_certify.graphs.rationals import MINUS, shorten
 _POSITIVE = (
     "+ positive pos plus up activate activates activated activating activation activator act induce induces induction "
     "stimulate stimulates stimulation upregulate upregulates upregulation promote promotes enhance enhances "
-    "ally allies friend friends trust trusts like likes support supports agree agrees alliance for --> ->"
+    "ally allies friend friends trust trusts like likes support supports agree agrees alliance "
+    "excitatory excites excitation upregulated cooperation for --> ->"
 )
 _NEGATIVE = (
     f"- {MINUS} negative neg minus down inhibit inhibits inhibited inhibiting inhibition inhibitor inh repress "
     "represses repressed repressing repression repressor suppress suppresses suppression downregulate downregulates "
     "downregulation block blocks enemy enemies foe foes opponent opponents rival rivals distrust distrusts dislike "
-    "dislikes oppose opposes disagree disagrees hostility against --| -| |"
+    "dislikes oppose opposes disagree disagrees hostility "
+    "inhibitory downregulated conflict against --| -| |"
 )
 _SIGNS = dict.fromkeys(_POSITIVE.split(), 1) | dict.fromkeys(_NEGATIVE.split(), -1)
 #: Titles of weights, and of what is a sign beside a weight: of both the first that occurs counts.
@@ -104,7 +106,7 @@ def weight_and_sign(titles: Sequence[str], place: str) -> tuple[int | None, int 
 def code_among(values: Sequence[Fraction], title: str) -> Fraction | None:
     """Return a number that makes a column of relations one of codes; None where it holds signs, 1 and -1.
 
-    A column called sign may hold 1 alone, or any number beside a negative one.
+    A column called sign may hold 1 alone, or any number beside a negative one; fractions are no codes.
 
     Examples
     --------
@@ -114,7 +116,7 @@ def code_among(values: Sequence[Fraction], title: str) -> Fraction | None:
     numbers = set(values)
     if title.strip().lower() == "sign":
         return None if min(numbers, default=0) < 0 else next((v for v in values if v != 1), None)
-    if not numbers or (-1 in numbers and numbers <= {-1, 0, 1}):
+    if not numbers or (-1 in numbers and numbers <= {-1, 0, 1}) or any(v.denominator > 1 for v in numbers):
         return None
     return next((v for v in values if v not in (-1, 1)), values[0])
 

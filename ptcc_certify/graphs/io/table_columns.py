@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ptcc_certify.errors import FormatError
+from ptcc_certify.graphs.io.columns_beside import is_signed, is_size
 from ptcc_certify.graphs.io.signs import (
     SIGN,
     WEIGHT,
@@ -17,7 +18,7 @@ from ptcc_certify.graphs.io.signs import (
     sign_of_word,
     weight_and_sign,
 )
-from ptcc_certify.graphs.io.text_matrices import is_entry
+from ptcc_certify.graphs.io.text_matrices import is_entry, is_number
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
 
@@ -159,13 +160,20 @@ def _refuse_family(titles: Sequence[str], place: str) -> None:
 
 
 def named_columns(titles: Sequence[str], place: str) -> Columns:
-    """Return the columns of a row that names source and target; none where it is a row of edges all the same."""
+    """Return the columns of a row that names source and target; none where it is a row of edges all the same.
+
+    The third of three titles is that of the weight, too, where it is a word for a positive sign, such as trust.
+    """
     _refuse_family(titles, place)
     source, target, _ = edge_columns(titles, place) or (0, 1, None)
     weight, sign = weight_and_sign(titles, place)
     if weight is None:
-        if is_entry("".join(titles[2:3])):
+        if is_number("".join(titles[2:3])):
             return Columns()
+        rest = [k for k in range(len(titles)) if k not in (source, target)]
+        if len(rest) == 1 and re.match(r"[^\W\d_]", titles[rest[0]]) and sign_of_word(titles[rest[0]]) == 1:
+            note = _note(titles, source, target, rest[0])
+            return Columns(source, target, rest[0], titles=tuple(titles), notes=(note,), guessed=True)
         mend = "name one column weight, sign or rating, or tell the three: --columns source,target,NAME"
         raise FormatError(f"{place}: the header names no weight; {mend}")
     notes = [BY_HEADER] if source > 0 else []
@@ -192,19 +200,53 @@ def _told(titles: tuple[str, ...], others: Sequence[Sequence[str]], place: str, 
     return Columns(at[0], at[1], at[2], titles=titles, told=True, notes=(_note(titles, *at),))
 
 
+def turns_edges(titles: Sequence[str], place: str) -> bool:
+    """Tell whether titles that stand in a comment say another direction than source first, or who listens.
+
+    Examples
+    --------
+    >>> turns_edges(["follower", "leader", "weight"], ""), turns_edges(["source", "target", "weight"], "")
+    (True, False)
+    """
+    written = [plain(title) for title in titles]
+    ends = edge_columns(titles, place)
+    if ends is not None:
+        return ends[2] is not None and (ends[:2] != (0, 1) or written[0] == "rater")
+    if len(titles) < 3:
+        return False
+    listens, heard = "|".join((rf"({_LISTENERS}){_REST}", *_ENDS)), "|".join((rf"({_HEARD}){_REST}", *_STARTS))
+    turned = re.fullmatch(listens, written[0]) or re.fullmatch(heard, written[1])
+    weight = any(names_edges([title]) or is_size(title) or is_signed(title) for title in titles[2:])
+    return bool(turned and weight) or re.fullmatch(_OF_MATRIX, written[2]) is not None
+
+
+def asks_of_corner(corner: str, line: str) -> str:
+    r"""Return why the direction of a matrix must be told: its corner says that rows are heard; "" of any other.
+
+    Examples
+    --------
+    >>> asks_of_corner("target", "line 1"), asks_of_corner(r"from\to", "line 1").partition(";")[0]
+    ('', 'line 1: the corner from\\to says that rows are heard')
+    """
+    words = "|".join((*_STARTS, rf"({_HEARD}){_REST}"))
+    if not re.fullmatch(words, plain(re.split(r"[\\/|:>,]", corner.strip())[0])):
+        return ""
+    mend = "say --edges information if they are, or --edges listens if rows listen to columns"
+    return f"{line}: the corner {shorten(corner)} says that rows are heard; {mend}"
+
+
 def _is_header(titles: Sequence[str], weight: int, others: Sequence[Sequence[str]]) -> bool:
     """Tell whether a row is of titles: where all others have a number, or a sign, it has a word that is none.
 
-    The word may be one for a sign, such as Trust, beside a title of an end and above numbers.
+    The word may be one for a sign, such as Trust, beside a title of an end and above numbers or signs.
     """
     title = titles[weight]
     if not re.match(r"[^\W\d_]", title) or _NO_TITLE.fullmatch(title):
         return False
     below = [row[weight].strip() for row in others if len(row) > max(weight, 1)]
     if is_entry(title):
-        ends = (_LISTENERS, *_STARTS), (_HEARD, *_ENDS)
-        named = any(re.fullmatch("|".join(words), plain(end)) for words, end in zip(ends, titles, strict=False))
-        return named and bool(below) and all(is_entry(text) and sign_of_word(text) is None for text in below)
+        words = "|".join((_LISTENERS, _HEARD, *_STARTS, *_ENDS))
+        return any(re.fullmatch(words, plain(end)) for end in titles[:2]) and bool(below) and all(map(is_entry, below))
     return bool(below) and (all(map(is_entry, below)) or (is_sign(title) and all(below)))
 
 

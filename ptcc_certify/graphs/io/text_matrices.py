@@ -34,6 +34,17 @@ def is_zero(text: str) -> bool:
     return _ZERO.fullmatch(text) is not None
 
 
+def is_number(text: str) -> bool:
+    """Tell whether a text is a number.
+
+    Examples
+    --------
+    >>> is_number("-0.5"), is_number("1/3"), is_number("+")
+    (True, True, False)
+    """
+    return _NUMBER.fullmatch(text) is not None
+
+
 def is_entry(text: str) -> bool:
     """Tell whether a text is a number, or a word for a sign.
 
@@ -42,7 +53,7 @@ def is_entry(text: str) -> bool:
     >>> is_entry("-0.5"), is_entry("1/3"), is_entry("+"), is_entry("b")
     (True, True, True, False)
     """
-    return _NUMBER.fullmatch(text) is not None or sign_of_word(text) is not None
+    return is_number(text) or sign_of_word(text) is not None
 
 
 def matrix_rows(labels: list[str], entries: Sequence[Line]) -> Rows:
