@@ -683,7 +683,7 @@ def test_a_statement_holds_hypotheses_claim_and_numbers(tmp_path: Path):
     text = report_latex(read_certificate(tmp_path / "c.json"), {"graph": "g.pdf", "decay": "d.pdf"})
     assert (
         r"[certified]\label{prop:c}" in text
-        and r"at $T$, without limits, without noise, without disturbances, by Theorem~2.1: as $t \to T$, for some $a$" in text
+        and r"at $T$, without limits, noise or disturbances, by Theorem~2.1: as $t \to T$" in text
     )
     assert NOMINAL.latex() in text and made.graph.sha256 in text and "$\\kappa = 1$" in text
     rows = [re.search(rf"^{name}_{{i}} & ([^\\]*)", text, re.M) for name in "cr"]

@@ -196,7 +196,7 @@ def _told(titles: tuple[str, ...], others: Sequence[Sequence[str]], place: str, 
         at.append(k)
     by_title = not all(wanted.isdigit() for wanted in how.titles)
     if not by_title and edge_columns(titles, place) is None and not _is_header(titles, at[2], others):
-        return Columns(at[0], at[1], at[2], told=True)
+        return Columns(at[0], at[1], at[2], told=True, notes=(_note(how.titles, 0, 1, 2),))
     return Columns(at[0], at[1], at[2], titles=titles, told=True, notes=(_note(titles, *at),))
 
 

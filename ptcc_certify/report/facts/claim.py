@@ -52,28 +52,23 @@ def asked_messages(certificate: Certificate) -> LateMessages | None:
     return None if certificate.proof.late is None else certificate.proof.late.messages
 
 
-def undisturbed(certificate: Certificate) -> bool:
-    """Tell whether disturbances were asked about that what is told is without, but for facts that name them."""
-    leaders = certificate.proof.asked_leaders
-    asked = certificate.delta is not None or (leaders is not None and leaders.disturbance > 0)
-    return asked and certificate.protocol.reaching is None
-
-
 def assumptions(certificate: Certificate) -> list[str]:
     """Tell what claim, final state, rate and error are without, where more was asked."""
-    messages, leaders = asked_messages(certificate), certificate.proof.asked_leaders
+    messages, leaders, limits = asked_messages(certificate), certificate.proof.asked_leaders, bool(certificate.limits)
     virtual = messages is not None and messages.vehicles is not None
+    asked = {"limits": limits, "noise": certificate.noise is not None}
+    asked["disturbances"] = certificate.delta is not None and certificate.protocol.reaching is None
+    lacking = [name for name, holds in asked.items() if holds]
     assumed = {
-        "without limits": bool(certificate.limits),
-        "without noise": certificate.noise is not None,
         "of virtual positions": virtual,
-        "without a gain cap": not certificate.limits and messages is not None and messages.gain_cap is not None,
+        "without a gain cap": not limits and messages is not None and messages.gain_cap is not None,
         "nothing late": messages is not None and not (virtual and messages.exact),
         "leaders at rest": certificate.proof.leaders_move,
-        "without disturbances": undisturbed(certificate),
+        "without disturbances": leaders is not None and leaders.disturbance > 0,
         "without sign(e_k)": leaders is not None and leaders.sign_gain is not None,
     }
-    return [text for text, holds in assumed.items() if holds]
+    first = ", ".join(lacking[:-1]) + " or " * (len(lacking) > 1) + "".join(lacking[-1:])
+    return [f"without {first}"] * bool(lacking) + [text for text, holds in assumed.items() if holds]
 
 
 def claim_facts(certificate: Certificate) -> Facts:

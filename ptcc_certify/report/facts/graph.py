@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import PurePath
 
@@ -12,7 +13,6 @@ from ptcc_certify.certificate.fact import Fact, Facts
 from ptcc_certify.errors import labelled
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.io.columns_beside import IGNORED
-from ptcc_certify.graphs.io.table_columns import BY_HEADER
 from ptcc_certify.graphs.structure import ClosedComponent, Structure, analyse
 from ptcc_certify.report.text_layout import (
     TEXT,
@@ -63,6 +63,9 @@ def family_facts(family: Family, name: str, read: str, components: Sequence[Fami
     ``components`` are those of its decision, which hold structures; without them no details are told.
     """
     yield Fact(head="family", value=family.n_nodes, note=family_text(family, name))
+    if any(map(_tells_columns, family.notes)):
+        for way, text in _BY_HEADER.items():
+            read = read.replace(ORIENTATION[way], text)
     if read or family.notes:
         yield Fact(head="read", note="; ".join(filter(None, (read, *family.notes))))
     if components is None:
@@ -77,6 +80,11 @@ def family_facts(family: Family, name: str, read: str, components: Sequence[Fami
         yield Fact(head="mode", note=text, detail=True)
         if edges := _uncertain_edges(mode):
             yield Fact(head="mode", note=f"uncertain: {edges}", detail=True)
+
+
+def _tells_columns(note: str) -> bool:
+    """Tell whether a note, perhaps of a mode, tells which columns are source and target."""
+    return re.search(rf"(^|: )columns (?!{IGNORED.removeprefix('columns ')})", note) is not None
 
 
 def leader_facts(structure: Structure) -> Facts:
@@ -150,9 +158,9 @@ def _reading_facts(structure: Structure) -> Facts:
     """Tell how the rows were read: in full what makes another graph of them, and what else as far as it fits."""
     text = ORIENTATION[structure.graph.read["orientation"]]
     remarks = [remark for remark in remarks_on(structure) if remark not in _OF_STRUCTURE]
-    if BY_HEADER in remarks:
-        remarks.remove(BY_HEADER)
-        text = f"{BY_HEADER}: {_BY_HEADER[structure.graph.read['orientation']]}"
+    if told := next(filter(_tells_columns, remarks), ""):
+        remarks.remove(told)
+        text = f"{told}: {_BY_HEADER[structure.graph.read['orientation']]}"
     ignored = [shorten_text(remark, TEXT) for remark in remarks if remark.startswith(IGNORED)]
     lines = [text]
     for remark in [*(remark for remark in remarks if not remark.startswith(IGNORED)), *ignored]:

@@ -122,9 +122,9 @@ def _of_family(certificate: Certificate, details: bool, beside: bool) -> Facts:
 
 def _beside(certificate: Certificate) -> list[Fact]:
     """Tell what the rest of a certificate knows nothing of: nothing, or one fact."""
-    without = [text for text in assumptions(certificate) if text not in ("without limits", "without noise")]
-    if without == ["without disturbances"]:  # what these add is told in a fact of its own, as is what limits leave
-        return []
+    if certificate.proof.late is None and not certificate.proof.leaders_move:
+        return []  # facts that are without limits, noise or disturbances say so
+    without = [text for text in assumptions(certificate) if not text.startswith("without limits")]
     text = f"{', '.join(without)}, in what follows"
     return [Fact(head="given", note=text, detail=True)] if without else []
 
