@@ -35,6 +35,7 @@ class Certificate(Recorded):
 
     Made by :func:`ptcc_certify.certify`, or read from a file by :func:`read_certificate`. What its parts tell is asked
     of it by the same names: ``cert.rate`` is ``cert.proof.rate``, ``cert.limits`` is ``cert.question.request.limits``.
+    In a formation ``cert.final_state`` is of positions, and ``cert.proof.final_state`` less the places.
 
     Attributes
     ----------

@@ -11,7 +11,8 @@ import numpy as np
 
 from ptcc_certify.bounds.agents.run_against_bounds import AgentsComparison
 from ptcc_certify.bounds.envelope import Comparison, remaining_part
-from ptcc_certify.bounds.final_state.of_graph import final_state
+from ptcc_certify.bounds.final_state.labelled_ends import FinalEnds
+from ptcc_certify.bounds.final_state.of_graph import FinalState, final_state
 from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.certificate.proof import OfQuestion
@@ -94,6 +95,11 @@ class Evidence(OfQuestion, Shown):
                 raise AttributeError(name)
             part = self.observed if hasattr(type(self.observed), name) else self.proof
             return getattr(part, name)
+
+    @property
+    def final_state(self) -> FinalState | FinalEnds | None:
+        """Where agents end, of a family between which ends; in a formation ``proof.final_state`` is less places."""
+        return self.proof.final_positions
 
     @property
     def graph_proof(self) -> GraphProof:

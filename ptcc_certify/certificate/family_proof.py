@@ -375,6 +375,11 @@ class FamilyProof(Proof):
                 result[int(part.component.nodes[k])] = ends
         return FinalEnds(result, self.family.labels)
 
+    @property
+    def final_positions(self) -> FinalEnds | None:
+        """Where agents end: those of families have no places."""
+        return self.final_state
+
     def _state(self, part: ComponentProof) -> list[Fraction]:
         """Return ``x(0) - sigma(0)`` of a component."""
         assert self.nominal_state is not None

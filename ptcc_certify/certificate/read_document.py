@@ -27,6 +27,7 @@ from ptcc_certify.certificate.unverified_section import (
     read_observations,
     read_request,
     read_unproved,
+    read_unproved_signals,
     read_upper_bound,
 )
 from ptcc_certify.checker.attracting_boxes import AttractingBox, KeptBox
@@ -118,7 +119,7 @@ def _read_family_proof(source: Source, family: Family, words: dict[str, Any]) ->
         read_claim(f"restricted[{k}]", entry, proved, components)
         for k, entry in enumerate(sections.get("restricted", ()))
     )
-    signal = restricted[0].signal if restricted else "any"
+    signal = restricted[0].signal if restricted else read_unproved_signals(document["unverified"])
     question = words.pop("question")
     boxes = sections.get("boxes", ())
     return FamilyProof(

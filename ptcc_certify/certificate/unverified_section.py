@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -15,11 +15,13 @@ from ptcc_certify.bounds.delay.late_messages import LateBounds, delays, read_mes
 from ptcc_certify.bounds.envelope import FRACTIONS, LAST_INSTANTS
 from ptcc_certify.bounds.input.effort import LIMITS
 from ptcc_certify.bounds.tracking import asked_leaders, read_leaders
+from ptcc_certify.certificate.constrained_switching.sections import read_signals, signals_section
 from ptcc_certify.certificate.evidence import Evidence, Observations
 from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.certificate.section_io import Writer, finite, readable, text, write
+from ptcc_certify.checker.constrained_switching import Dwell, Shares, Windows
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.checker.leaders import LeadersAsked
 from ptcc_certify.checker.messages_asked import Delays
@@ -34,6 +36,7 @@ from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound, Membe
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.search import METHODS
 from ptcc_certify.model.base import Protocol
+from ptcc_certify.model.constrained_switching import SignalClass
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.theorems.counterexample_text import mode_name
@@ -165,6 +168,26 @@ def nothing_proved(
     return LateBounds(LateCase(structure, protocol, messages, leaders=leaders), relative)
 
 
+def _write_signals(proof: FamilyProof) -> dict[str, Any]:
+    """Return the restricted signals that were asked for where nothing is claimed of these alone."""
+    if proof.restricted or proof.signal == "any":
+        return {}
+    signals = signals_section(proof.signal)
+    return {"signals": signals if isinstance(signals, str) else write(type(signals), signals, Writer(proof.labels))}
+
+
+def read_unproved_signals(unverified: Mapping[str, Any]) -> SignalClass:
+    """Return the restricted signals that were asked for where nothing is claimed of these alone; ``any`` if none."""
+    asked, at = unverified.get("asked"), Context(SideFiles(Path(), {}), ())
+    entry = asked.get("signals") if isinstance(asked, dict) else None
+    if entry is None:
+        return "any"
+    return (
+        readable(lambda: read_signals(read(Dwell | Windows | Shares | Literal["constant"], entry, at, "signals")))
+        or "any"
+    )
+
+
 def write_unverified(certificate: Evidence) -> dict[str, Any]:
     """Return what was asked, searched and seen."""
     proof, notes = certificate.proof, list(certificate.observed.notes)
@@ -174,7 +197,7 @@ def write_unverified(certificate: Evidence) -> dict[str, Any]:
         bounds = [(part.component, part.upper_bound) for part in proof.parts]
         return {
             "upper_bounds": [None if b is None else upper_bound_entry(Quotient.of(c), b) for c, b in bounds],
-            "asked": {"behaviour": proof.expectations.behaviour} | write_unproved(proof),
+            "asked": {"behaviour": proof.expectations.behaviour} | write_unproved(proof) | _write_signals(proof),
             "read": dict(proof.family.read) or None,
             **{"origins": origins, "scenario": scenario, "notes": notes},
         }

@@ -243,7 +243,7 @@ def _answer_with_gains(blank: Design, fit: Fit) -> Design:
         how = effort.peak.norm_how if by_norm else effort.peak.how[v]
         whose = "||u||" if by_norm else f"the input of agent {shorten(cert.graph_proof.graph.labels[v])}"
         when = f"{nearest_float(fit.deadline) * -math.expm1(-nearest_float(how.z)):.4g}"
-        binding = f"{whose}, largest about t = {when}, {_percent(fit.peak, limit)}"
+        binding = f"the bound of {whose}, largest about t = {when}, {_percent(fit.peak, limit)}"
     if blank.asked.input_norm is None:  # an expectation is one of every |u_k|
         cert = cert.changed(expectations=Expectations(max_input=limit))
     product = fit.peak * fit.deadline

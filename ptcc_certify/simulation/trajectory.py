@@ -277,7 +277,7 @@ class Trajectory(ByAgent, ByValue, Shown):
     clock : (M,) array
         ``s``; infinite from ``T`` on unless ``rho2 = 0``. Behind an actuator the integral of the gain that acts.
     states : (N, M) or (N, S, M) array
-        ``X``, or S columns of states.
+        ``X``, or S columns of states; in a formation less the places of its agents, see :attr:`positions`.
     tolerances : Tolerances
         Those of the integrator; ``atol`` is relative to the largest entry of each initial state.
     deadline_residual : float or None
@@ -386,7 +386,7 @@ class Trajectory(ByAgent, ByValue, Shown):
 
     @property
     def final_state(self) -> np.ndarray:
-        """(N,) or (N, S) array: the state at the deadline ``T``.
+        """(N,) or (N, S) array: the state at the deadline ``T``; in a formation less places, as ``states`` is.
 
         Raises
         ------

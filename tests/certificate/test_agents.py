@@ -201,6 +201,7 @@ def test_single_integrators_in_a_formation_have_the_plain_certificate_of_their_p
     ours.save(tmp_path / "places.json")
     again = read_certificate(tmp_path / "places.json")
     assert again == ours and again.offsets == ours.offsets
+    assert again.final_state == ours.final_state == ours.final_positions != ours.proof.final_state
     assert ours.to_pandas()["x(T)"].to_list() == [float(x) for x in ours.final_positions.states]
     assert any("of x - offsets" in line for line in summary_lines(again, "team"))
 

@@ -49,7 +49,7 @@ from ptcc_certify.theorems.theorem import Obligation
 _BITS = 64
 
 
-def _signal(signal: SignalClass) -> Any:
+def signals_section(signal: SignalClass) -> Any:
     """Return a class of signals as files have it."""
     if isinstance(signal, ClockShares):
         return Shares(shares=signal.shares)
@@ -79,7 +79,7 @@ def ball(low: Fraction, high: Fraction) -> Interval:
 
 def claim_section(claim: Claim, nodes: np.ndarray, labels: Sequence[str]) -> Section:
     """Return a claim about the component of the agents of these places and labels."""
-    about: dict[str, Any] = {"signals": _signal(claim.signal), "component": claim.component}
+    about: dict[str, Any] = {"signals": signals_section(claim.signal), "component": claim.component}
     if isinstance(claim, FinalValueClaim):
         modes = [None if ends is None else _value(ends, labels) for ends in claim.values]
         return FinalValueSection(claim="final value", **about, modes=modes)
@@ -126,7 +126,8 @@ def claim_steps(of: str, claim: Claim, labels: Sequence[str]) -> Iterator[Obliga
             yield Obligation("family-rate", f"{of}.modes[{mode}]", {"b": rate}, Multipliers(multipliers=tau))
 
 
-def _read_signal(entry: Any) -> SignalClass:
+def read_signals(entry: Any) -> SignalClass:
+    """Return a class of signals that files name."""
     if isinstance(entry, Shares):
         return ClockShares(tuple(entry.shares))
     if isinstance(entry, Windows):
@@ -137,7 +138,7 @@ def _read_signal(entry: Any) -> SignalClass:
 def read_claim(of: str, entry: Section, proved: Proved, components: Sequence[FamilyComponent]) -> Claim:
     """Return a claim of a certificate that was accepted; about one of its components."""
     number = entry.component
-    signal = _read_signal(entry.signals)
+    signal = read_signals(entry.signals)
     component = components[entry.component]
     steps = rates_of(of, proved)
     if isinstance(entry, FinalValueSection):

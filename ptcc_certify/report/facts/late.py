@@ -230,9 +230,11 @@ def _within_text(late: LateBounds, digits: int) -> str:
 
 
 def _kept_off(late: LateBounds) -> Facts:
-    """Tell what of this bound no gain takes away, since leaders move on while messages come."""
+    """Tell what no gain takes out of this bound, since leaders move on while messages come."""
     if late.never_below:
-        note = f"{down(late.never_below, 2)} of that no gain takes away: leaders move on while messages come"
+        note = (
+            f"{down(late.never_below, 2)} of that no gain takes out of this bound: leaders move on while messages come"
+        )
         yield Fact(head="late", value=late.never_below, side="down", note=note)
 
 

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.checker.reading import Interval
 
+#: Most leader groups that are named.
+_NAMED = 9
 #: Columns of a list of intervals on a short screen and on a long one.
 _SHORT, _LONG = 2 * TEXT - 20, 12 * TEXT
 
@@ -51,7 +53,7 @@ def final_facts(certificate: Certificate) -> Facts:
     if result is None:
         return
     remarks = {
-        "balanced leaders happen to meet at 0": bool(result.degenerate),
+        _meeting(certificate): bool(result.degenerate),
         **dict.fromkeys(assumptions(certificate), True),
         "not certified that they get there": certificate.verdict == "undecided",
     }
@@ -80,9 +82,18 @@ def final_facts(certificate: Certificate) -> Facts:
         brief=(f"{brief} {kind}",),
     )
     if result.degenerate:
-        meeting = ", ".join(map(str, result.degenerate))
-        text = f"of this x(0) leader group {meeting} happens to meet at 0, although it is balanced"
-        yield Fact(head="x(T)", note=text, detail=True)
+        yield Fact(head="x(T)", note=f"of this x(0) {_meeting(certificate)}", detail=True)
+
+
+def _meeting(certificate: Certificate) -> str:
+    """Tell which balanced leader groups happen to meet at 0, in a formation at their places."""
+    proof = certificate.graph_proof
+    groups, formation = proof.degenerate, proof.offsets is not None
+    named = ", ".join(map(str, groups[:_NAMED])) + (", .." if len(groups) > _NAMED else "")
+    if len(groups) == 1:
+        where = "its place" if formation else "0"
+        return f"leader group {named} happens to meet at {where}, although it is balanced"
+    return f"leader groups {named} happen to meet at {'their places' if formation else '0'}, although they are balanced"
 
 
 def _accuracy(result: FinalState, rounded: str = "here to 5 digits") -> str:
