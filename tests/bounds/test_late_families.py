@@ -386,6 +386,8 @@ def test_page_and_latex_tell_no_end_of_another_problem(name: str, tmp_path: Path
     saved = ptcc.read_certificate(tmp_path / "c.json")
     capped = made.late is not None and made.late.messages.gain_cap is not None
     absent = {"without a gain cap": capped, "nothing late": made.late is not None, "leaders at rest": made.leaders_move}
+    asked = made.proof.asked_leaders
+    absent["without disturbances"] = asked is not None and asked.disturbance > 0
     without = ", ".join(text for text, there in absent.items() if there)
     page = report_html(saved)
     assert f"Where the agents end, {without}, proved for every signal" in page

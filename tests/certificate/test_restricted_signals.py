@@ -683,3 +683,13 @@ def test_claims_of_several_components_name_theirs():
     certificate = certify_family(Family.switching([first, second]), PROTOCOL, signal=JointWindows(2, on=1, clock="s"))
     lines = [fact.text for fact in signal_facts(certificate) if fact.head == "windows"]
     assert lines and all(line.startswith("component of ") for line in lines)
+
+
+def test_signals_of_which_nothing_is_claimed_stand_in_the_file(tmp_path: Path):
+    family = Family.from_intervals([("a", "b", 1, 1), ("b", "a", 1, 1), ("b", "c", 0, 1), ("c", "b", 0, 1)])
+    made = certify_family(family, NominalProtocol(), [1, 2, 3], signal=JointWindows(1, "0.3"))
+    made.save(tmp_path / "c.json")
+    saved = read_certificate(tmp_path / "c.json")
+    for certificate in (made, saved):
+        assert certificate.facts()[-1].text.startswith("left open: what these signals do")
+    assert saved.family_proof.signal == made.family_proof.signal

@@ -75,7 +75,7 @@ def claim_facts(certificate: Certificate) -> Facts:
     """Tell what the agents of one graph do, by when, and under what."""
     p = certificate.protocol
     assumed = assumptions(certificate)
-    also = "".join(f", {text}" for text in (assumed[:1] if certificate.limits else assumed))
+    also = "".join(f", {text}" for text in (["without limits"] if certificate.limits else assumed))
     if p.reaching is not None and not also:
         also = f", any |d_k| <= {down(p.reaching.delta, 12)}" if p.reaching.delta else ", without disturbances"
     when = f" at T = {near(p.T)}"
