@@ -5,8 +5,8 @@ and followers are pushed by ``d gain(t)/g``: within the limits of ``v`` and ``d`
 
     eps_(i+1) = E eps_i + (I - E) L_F^-1 (d - X*') / g,    E = e^(-L_F (s_(i+1) - s_i)).
 
-So without the sign term every run is a solution, up to rounding. The sign term acts with a boundary layer, held over
-steps.
+So without the sign term every run is a solution, up to rounding. The sign term is held over steps, at a value that
+``mu sign(e)`` takes where the step ends: of any within ``mu`` where ``e`` is 0 there, so that it stays 0.
 """
 
 from __future__ import annotations
@@ -33,6 +33,8 @@ from ptcc_certify.simulation.worst_leaders import WorstLeaders
 STEPS, SHARE, NEAREST, PAST = 800, 0.02, 1e-7, 0.5
 #: Most steps of a run.
 MOST_STEPS = 20_000
+#: Iterations for a sign term at most, and what they may change of it at last, relative to its gain.
+_ITERATIONS, _CONVERGED = 1000, 1e-12
 
 
 @gated
@@ -104,11 +106,11 @@ def simulate_tracking(
         states[i, heads] = targets[i, heads] = lead
         targets[i, F] = Q @ lead
         states[i, F] = targets[i, F] + eps
-        j = min(i, t.size - 2)
-        inputs[i, F] = -gain[i] * (L_F @ eps) + step_of.sign_term(eps, t[j + 1] - t[j])
+        inputs[i, F] = -gain[i] * (L_F @ eps)
         if i + 1 < t.size:
-            moved, eps = step_of(eps, clock[i], last[i], t[i + 1] - t[i])
+            moved, eps = step_of(eps, clock[i], last[i])
             lead, inputs[i, heads] = lead + moved, moved / (t[i + 1] - t[i])
+        inputs[i, F] += step_of.term
     conditions, seconds = Conditions(leaders=leaders), time.perf_counter() - begin
     run = stepped_run(structure.graph, protocol, t, states.T, inputs.T, conditions, NEAREST, seconds)
     return replace(run, targets=targets.T)
@@ -128,29 +130,39 @@ def _grid(protocol: Protocol, steps: int) -> tuple[np.ndarray, np.ndarray, np.nd
 
 
 class _Step:
-    """One step of the deviations, at the worst velocities and disturbances."""
+    """One step of the deviations, at the worst velocities and disturbances; ``term`` is the latest sign term."""
 
     def __init__(self, worst: WorstLeaders, leaders: MovingLeaders):
         self.worst, self.L_F = worst, worst.L_F
         self.inverse = np.linalg.inv(worst.L_F)
         self.sign = None if leaders.sign_gain is None else float(leaders.sign_gain)
+        self.term = np.zeros(worst.followers.size)
 
-    def __call__(self, eps: np.ndarray, ds: float, gain: float, dt: float) -> tuple[np.ndarray, np.ndarray]:
+    def __call__(self, eps: np.ndarray, ds: float, gain: float) -> tuple[np.ndarray, np.ndarray]:
         """Return by how much leaders move, and the deviations after the step."""
         if np.isinf(gain):
             return np.zeros(self.worst.heads.size), np.zeros_like(eps)
         v = self.worst.velocities(eps)
-        push = self.worst.pushes(eps) - self.worst.Q @ v + self.sign_term(eps, dt)
-        E = _decay(self.L_F * ds)
-        new = E @ eps + (np.eye(eps.size) - E) @ (self.inverse @ push) / gain
+        push, E = self.worst.pushes(eps) - self.worst.Q @ v, _decay(self.L_F * ds)
+        passed = (np.eye(eps.size) - E) / gain
+        new = E @ eps + passed @ (self.inverse @ push)
+        if self.sign:
+            self.term = _sign_term(passed, -(self.L_F @ new), self.sign, self.term)
+            new = new + self.inverse @ (passed @ self.term)
         return v * ds / gain, new
 
-    def sign_term(self, eps: np.ndarray, dt: float) -> np.ndarray:
-        """Return ``mu sign(e)`` with a boundary layer, or zeros without the sign term."""
-        if not self.sign:
-            return np.zeros_like(eps)
-        layer = 2 * self.sign * max(dt, 1e-300) * np.abs(self.L_F).sum(axis=1)
-        return self.sign * np.clip(-(self.L_F @ eps) / layer, -1, 1)
+
+def _sign_term(A: np.ndarray, e: np.ndarray, mu: float, term: np.ndarray) -> np.ndarray:
+    """Return ``u`` in ``mu sign(e - A u)``, any of ``[-mu, mu]`` where that is 0, from a first guess.
+
+    The sums of ``|e^(-L_F s)|`` over rows are at most 1, so that the diagonal of ``A`` dominates: they converge.
+    """
+    diagonal = np.diag(A)
+    for _ in range(_ITERATIONS):
+        before, term = term, np.clip(term + (e - A @ term) / diagonal, -mu, mu)
+        if np.abs(term - before).max() <= _CONVERGED * mu:
+            break
+    return term
 
 
 def _decay(A: np.ndarray) -> np.ndarray:
