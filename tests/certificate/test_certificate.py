@@ -558,7 +558,7 @@ def test_a_degenerate_start_is_named_in_json_and_on_screen(tmp_path: Path):
     assert "of this x(0) leader group 1 happens to meet at 0, although it is balanced" in screen
     brief = " ".join(ptcc("certify", str(path), "--x0", special).out.split())
     assert "leader group 1 happens to meet at 0, although it is balanced" in brief and "balanced leaders" not in brief
-    placed = ("--agents", "1", "--offsets", "a=1,b=1,c=1,d=1,e=1", "--x0", "a=3,b=2,c=1,d=1,e=6")
+    placed = ("--offsets", "a=1,b=1,c=1,d=1,e=1", "--x0", "a=3,b=2,c=1,d=1,e=6")
     text = " ".join(ptcc("certify", str(path), *placed).out.split())
     assert "leader groups 1, 2 happen to meet at their places, although they are balanced" in text, text
     unbalanced = certify(
