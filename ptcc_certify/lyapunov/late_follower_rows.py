@@ -238,19 +238,27 @@ class FollowerRows:
         ones = np.ones(self.intervals.n + self.intervals.outside)
         return np.asarray(self.intervals.largest_pushes(ones).max(axis=0))
 
-    def slack(self, u: np.ndarray) -> np.ndarray:
-        """Return ``sum_l |w_kl| (u_k - u_l)`` of every follower, at least."""
-        return np.asarray(self.intervals.pull(self._all(u)).min(axis=0))
+    def _rounding(self, u: np.ndarray) -> np.ndarray:
+        """Return by how much sums of ``|w_kl| (u_k - u_l)`` in floats are off at most, for every follower."""
+        return np.asarray((u.size + 4) * 2.0**-52 * self.largest(u))
 
-    def floor(self, u: np.ndarray, error: float) -> float:
+    def slack(self, witness: RowWitness) -> np.ndarray:
+        """Return ``sum_l |w_kl| (u_k - u_l)`` of every follower, at least: as in floats, and as the witness proves."""
+        u = witness.u
+        pulled = self.intervals.pull(self._all(u)).min(axis=0) - self._rounding(u)
+        return np.maximum(pulled, float(witness.b) * (1 - 1e-15) * u)
+
+    def floor(self, witness: RowWitness, error: float) -> float:
         """Return about the least ``f`` with ``sum_l |w_kl| (f (u_k - u_l) - error) >= 0`` for every follower.
 
         Halved towards it: at the largest weights of the least rows all are known to hold.
         """
-        low, high = error, float((self.weights / self.slack(u)).max()) * error
+        u = witness.u
+        low, high = error, float((self.weights / self.slack(witness)).max()) * error
         for _ in range(0 if self._known else _FLOORS):
             middle = (low + high) / 2
-            holds = bool((self.intervals.pull(self._all(middle * u), less=error) >= 0).all())
+            pulled = self.intervals.pull(self._all(middle * u), less=error)
+            holds = bool((pulled >= self._rounding(middle * u)).all())
             low, high = (low, middle) if holds else (middle, high)
         return high
 

@@ -833,3 +833,16 @@ def test_instants_before_0_or_none_are_refused(t: Any) -> None:
     assert tracking.distance_bound(0.5).shape == (1, 1)
     with pytest.raises(ParameterError, match=r"^remaining"):
         tracking.distance_bound(-0.5)
+
+
+def test_what_inexact_values_add_is_proved_where_weights_cancel() -> None:
+    edges = [(2, 0, "13/200"), (4, 0, 450), (0, 1, "19/10"), (5, 1, "1/100"), (6, 2, "13/10000"), (0, 4, 700)]
+    edges += [(6, 4, "3/25"), (0, 5, 990), (3, 5, "24/5"), (1, 6, "7/500")]
+    certificate = certify(
+        SignedDigraph.from_edges(edges),
+        NominalProtocol(),
+        [1, 2, 3, 4, 5, 6, 7],
+        messages=LateMessages(value_error="7/500", gain_cap="25.5"),
+        asks=Asks(simulation=False, method="paper"),
+    )
+    assert certificate.verdict == "certified" and certificate.checked.accepted

@@ -200,13 +200,13 @@ def row_bound(case: LateCase, rows: FollowerRows, first: np.ndarray, witness: Ro
         if witness.q <= 1:
             raise NoCertificate("q = 1 serves no delay")
         cap = rounded(log(witness.q)[0] / (witness.b * age), BITS)
-    floor = max(rows.floor(witness.u, float(case.exact.wrong)), LEAST) if case.exact.wrong else 0.0
+    floor = max(rows.floor(witness, float(case.exact.wrong)), LEAST) if case.exact.wrong else 0.0
     initial = Fraction(float((first / witness.u).max()) * MORE)
     row = RowBound(witness, cap, case.clock(cap), case.left(witness.b, cap), initial, Fraction(floor * MORE))
     if case.leaders is None:
         return row
     push = case.leaders.total / Fraction(float(witness.u.min()))
     drift = push * drift_above(case.protocol.gain.exact, witness.b, case.least_cap(cap))
-    flattest = Fraction(float((1 / rows.slack(witness.u)).max()) * MORE)
+    flattest = Fraction(float((1 / rows.slack(witness)).max()) * MORE)
     after = flattest * case.leaders.total / case.exact.least_gain(always=True)
     return replace(row, drift=rounded(drift, BITS, up=True), after=rounded(after, BITS, up=True))
