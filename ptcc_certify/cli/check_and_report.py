@@ -137,4 +137,4 @@ def report(certificate: str, output: str, simulation: bool | None, memory: float
     if (path := Path(output)).suffix.lower() == ".tex":
         figures = re.findall(rf"{re.escape(path.stem)}_\w+\.pdf", path.read_text(encoding="utf-8"))
         print_lines(f"{'written':<10} {', '.join(dict.fromkeys([path.name, *figures]))}")
-    return {"certified": ExitCode.OK, "undecided": ExitCode.UNDECIDED}.get(verdict, ExitCode.VIOLATED)
+    return {"undecided": ExitCode.UNDECIDED, "rejected": ExitCode.VIOLATED}.get(verdict, ExitCode.OK)

@@ -32,7 +32,7 @@ def states_table(saved: Certificate) -> tuple[str, list[Any], list[str]]:
     agents, end, ends = _tabled(saved), saved.graph_proof.final_state, f"Where the agents end{_assumed(saved)}"
     exact = end is None or end.radius is None
     if saved.proof.agents is not None:
-        caption = "Where the agents begin and end, and their inputs"
+        caption = f"Where the agents begin and end, and their inputs{_assumed(saved)}"
     elif end is None:
         caption = "Where the agents begin"
     elif saved.verdict == "certified":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from itertools import dropwhile, takewhile
+from itertools import dropwhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -131,8 +131,7 @@ def check_summary(path: str, document: Mapping[str, Any], report: CheckReport) -
         lines = format_lines([("claim", ", ".join(texts) + where)])
     if report.accepted and report.sections and path:
         with suppress(PTCCError):
-            told = dropwhile(lambda fact: fact.head != "protocol", _file_facts(path, document, report))
-            lines = short_screen(takewhile(lambda fact: fact.head != "verdict", told))
+            lines = short_screen(dropwhile(lambda fact: fact.head != "protocol", _file_facts(path, document, report)))
     return wrap_lines([*lines, report.lines()[-1]])
 
 
@@ -144,11 +143,13 @@ def _file_claim(claim: Mapping[str, str]) -> str:
 
 
 def _file_facts(path: str, document: Mapping[str, Any], report: CheckReport) -> list[Fact]:
-    """Return the facts of an accepted certificate, of a graph or a family, as its file says it."""
+    """Return the facts of an accepted certificate, as its file says it; a verdict only where something is left open."""
     from ptcc_certify.certificate.certificate import accepted_certificate
     from ptcc_certify.certificate.section_io import read_side_files
     from ptcc_certify.report.facts.of_certificate import facts_of
 
     origins = dict.fromkeys(("x(0)", "v(0)", "a(0)", "sigma(0)"), "as in the file")
     files = read_side_files(document, Path(path).parent)
-    return facts_of(accepted_certificate(Path(path), document, "", report, files), path, origins, details=False)
+    certificate = accepted_certificate(Path(path), document, "", report, files)
+    facts = facts_of(certificate, path, origins, details=False)
+    return [fact for fact in facts if fact.head != "verdict" or certificate.assessment.asked]

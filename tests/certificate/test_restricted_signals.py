@@ -22,6 +22,7 @@ from selection import thinned
 from lmi.exact.decimal_rounding import up
 from ptcc_certify import Family, NominalProtocol, SignedDigraph, certify
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
+from ptcc_certify.certificate.checking import read_and_check
 from ptcc_certify.certificate.constrained_switching.bounds import deviation_of_signal
 from ptcc_certify.certificate.constrained_switching.claims import LastModeClaim, RateClaim, ShareClaim
 from ptcc_certify.certificate.verdict import assess
@@ -34,7 +35,8 @@ from ptcc_certify.model.asks import Expectations
 from ptcc_certify.model.constrained_switching import ClockShares, DwellTime, JointWindows
 from ptcc_certify.report.facts.constrained_switching import signal_facts
 from ptcc_certify.report.page import report_html
-from ptcc_certify.report.screen import certificate_lines, summary_lines
+from ptcc_certify.report.report_file import write_report
+from ptcc_certify.report.screen import certificate_lines, check_summary, summary_lines
 from ptcc_certify.report.statement import report_latex
 from ptcc_certify.theorems.family_behaviour import decide
 from ptcc_certify.theorems.joint_windows import clock_for_all_edges
@@ -693,3 +695,6 @@ def test_signals_of_which_nothing_is_claimed_stand_in_the_file(tmp_path: Path):
     for certificate in (made, saved):
         assert certificate.facts()[-1].text.startswith("left open: what these signals do")
     assert saved.family_proof.signal == made.family_proof.signal
+    assert write_report(tmp_path / "c.json", tmp_path / "c.html") == "left open"
+    lines = check_summary(str(tmp_path / "c.json"), *read_and_check(tmp_path / "c.json"))
+    assert any(line.startswith("verdict    left open") for line in lines)

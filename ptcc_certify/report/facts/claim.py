@@ -67,7 +67,7 @@ def assumptions(certificate: Certificate) -> list[str]:
         "without disturbances": leaders is not None and leaders.disturbance > 0,
         "without sign(e_k)": leaders is not None and leaders.sign_gain is not None,
     }
-    first = ", ".join(lacking[:-1]) + " or " * (len(lacking) > 1) + "".join(lacking[-1:])
+    first = " or ".join(filter(None, (", ".join(lacking[:-1]), *lacking[-1:])))
     return [f"without {first}"] * bool(lacking) + [text for text, holds in assumed.items() if holds]
 
 
