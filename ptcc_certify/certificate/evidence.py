@@ -98,7 +98,10 @@ class Evidence(OfQuestion, Shown):
 
     @property
     def final_state(self) -> FinalState | FinalEnds | None:
-        """Where agents end, of a family between which ends; in a formation ``proof.final_state`` is less places."""
+        """Where agents end, of a family between which ends; in a formation ``proof.final_state`` is less places.
+
+        None where nothing is proved, and of agents of order n: :meth:`to_pandas` tells where those end.
+        """
         return self.proof.final_positions
 
     @property
