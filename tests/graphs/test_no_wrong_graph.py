@@ -1126,6 +1126,18 @@ def test_all_that_is_wrong_with_delays_is_one_message(tmp_path):
     assert "line 3: delay -1 of edge b -> c is negative (2 in all) (give a number >= 0); mend these" in said
 
 
+def test_names_of_a_matrix_that_are_not_read_are_told(tmp_path):
+    W = np.array([[0, 1, 0], [-1, 0, 2], [0, 1, 0]])
+    np.savetxt(tmp_path / "w.txt", W, header="ann bob cid")
+    note = "ignored as a comment: # ann bob cid; names are a first row"
+    assert read_graph(tmp_path / "w.txt").read["notes"] == ("a 3 x 3 matrix as text", note)
+    np.savez(tmp_path / "w.npz", A=W, nodes=["ann", "bob", "cid"])
+    assert read_graph(tmp_path / "w.npz").read["notes"] == ("array nodes is not read; names are an array labels",)
+    np.savez(tmp_path / "w.npz", A=W, labels=["ann", "bob", "cid"])
+    graph = read_graph(tmp_path / "w.npz")
+    assert (graph.labels, graph.read["notes"]) == (("ann", "bob", "cid"), ())
+
+
 def test_decimal_commas_of_intervals_and_ends_without_their_names_are_told(tmp_path):
     path = tmp_path / "e.csv"
     path.write_text('source,target,min,max\na,b,"-0,5",1\n')

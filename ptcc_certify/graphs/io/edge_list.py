@@ -117,6 +117,8 @@ def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
         if not declares and (matrix := table_as_matrix(table, name)) is not None:
             if (corner := table[0][0].strip()) not in matrix.labels:
                 matrix.asks = asks_of_corner(corner, f"line {started}")
+            if len(table) == len(matrix.labels):  # without a row of names
+                matrix.notes += _note_on_names(data, len(table))
             return matrix
     columns = columns_of(table[0], table[1:], f"{name}, line {started}", how) if table else Columns()
     if columns.titles:
@@ -151,6 +153,20 @@ def notes_on_comments(data: bytes) -> tuple[str, ...]:
         return ()
     rest = f" and {len(lines) - 1} more" if len(lines) > 1 else ""
     return (f"ignored as a comment: {shorten(lines[0].decode('utf-8', 'replace').strip())}{rest}",)
+
+
+def _note_on_names(data: bytes, n: int) -> tuple[str, ...]:
+    r"""Note a comment above a matrix that has as many words as there are nodes, as ``numpy.savetxt(header=..)`` does.
+
+    Examples
+    --------
+    >>> _note_on_names(b"# a b\n0 1\n-1 0\n", 2)
+    ('ignored as a comment: # a b; names are a first row',)
+    """
+    for line in islice((line.strip() for line in data[:10000].decode("utf-8", "replace").splitlines()), n):
+        if line[:1] in ("#", "%") and len(re.findall(r"[^\s,;#%]+", line)) == n:
+            return (f"ignored as a comment: {shorten(line)}; names are a first row",)
+    return ()
 
 
 def _is_row_of_edges(comment: str) -> bool:

@@ -149,7 +149,12 @@ def read_npz(data: bytes, name: str, how: Reading) -> Rows:
         labels = arrays.pop("labels", None)
         if "format" not in arrays:
             numeric = {key: array.shape for key, array in arrays.items() if array.dtype.kind in "iufc"}
-            return _dense(arrays[_the_matrix(numeric, arrays, name, how.variable)], labels, name)
+            rows = _dense(arrays[_the_matrix(numeric, arrays, name, how.variable)], labels, name)
+            one = len(rows.labels), "U"
+            texts = [key for key, array in arrays.items() if (*array.shape, array.dtype.kind) == one]
+            if texts:
+                rows.notes = (*rows.notes, f"array {shorten(texts[0])} is not read; names are an array labels")
+            return rows
         how.refuse("variable", name, "an archive of one sparse matrix")
         layout = arrays["format"].astype(str).item()
         entries = arrays["data"]
