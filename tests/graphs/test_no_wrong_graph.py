@@ -806,6 +806,55 @@ LAPLACIANS_OF_EDGES = [
     Input("g.csv", HEARD, says=("over edges of one source", "--edges listens"), how={"laplacian": True}),
     Input("g.csv", HEARD, "2>1=1 3>1=2 1>2=1 2>3=-1", how={"laplacian": True, "orientation": "listens"}),
 ]
+#: Comments that name columns or kinds of edges, titles and edges that look like each other, wide tables.
+TURNED = (
+    "target source score|to from trust|columns: target source weight|Format: target source weight|"
+    "gene tf activation|Target,Source,Correlation|To Node, From Node, Sign|target gene,source gene,weight"
+)
+SAYS_UNDIRECTED = (
+    "Type: undirected|weighted, undirected|is_directed: false|directed graph: no|directed false|"
+    "This is an undirected signed network"
+)
+SAYS_NOTHING = (
+    "Undirected edges were replaced by two arcs|undirected: n|undirected False|Target node values|"
+    "to be weighted|not undirected|directed: true"
+)
+WIDE = "lexA,-1,-1,1\ncrp,1,1,1\n"
+MIRRORED = "# Undirected graph\n1 2 3\n2 1 3\n2 3 -1\n3 2 -1\n"
+WORDS_OR_TITLES = [
+    *(
+        Input(
+            "g.csv",
+            f"# {line}\n" + ("1,2,3\n2,3,-1\n" if "," in line else "1 2 3\n2 3 -1\n"),
+            says=("--columns 2,1,3",),
+        )
+        for line in TURNED.split("|")
+    ),
+    Input("g.txt", "# prose\n" * 300 + "# target source weight\n1 2 3\n2 3 -1\n", says=("--columns 2,1,3",)),
+    *(Input("g.txt", f"# {line}\n1 2 3\n2 3 -1\n", says=("--undirected",)) for line in SAYS_UNDIRECTED.split("|")),
+    *(Input("g.txt", f"# {line}\n1 2 3\n2 3 -1\n", "1>2=3 2>3=-1") for line in SAYS_NOTHING.split("|")),
+    Input("g.txt", MIRRORED, says=("--undirected --duplicates last",)),
+    Input("g.txt", MIRRORED, "1>2=3 2>1=3 2>3=-1 3>2=-1", how={"undirected": True, "duplicates": "last"}),
+    *(
+        Input("g.csv", f"{corner},geneA,geneB,geneC\n{WIDE}", says=("line 1", "looks like a matrix with names"))
+        for corner in ("Regulator", "source", "target", "TF", "gene")
+    ),
+    Input("g.csv", "country1,country2,cooperation\nUSA,RUS,-\nUSA,UK,+\n", "USA>RUS=-1 USA>UK=1"),
+    Input("g.csv", "country1,country2,conflict\nUSA,RUS,-1\nUSA,UK,2\n", "USA>RUS=-1 USA>UK=2"),
+    Input("g.csv", "Gene1,Gene2,Excitation\na,b,activates\nb,c,inhibits\n", "a>b=1 b>c=-1"),
+    Input("g.csv", "ego,alter,like\na,b,+\nb,c,-\n", says=("line 1", "--edges listens")),
+    Input("g.csv", "leader,f1,trust\nleader,f2,distrust\nf1,f2,trust\n", "leader>f1=1 leader>f2=-1 f1>f2=1"),
+    Input("g.csv", "Start,Cln3,activates\nMBF,Clb5,activates\n", "Start>Cln3=1 MBF>Clb5=1"),
+    Input("g.csv", "leader,f1,trust\nf2,f3,distrust\n", says=("line 1", "are titles, or an edge?")),
+    Input("g.csv", "user1,user2,year,trust\na,b,1999,1\nb,c,2001,-1\n", says=("line 1", "names no weight")),
+    Input("g.csv", "gene1,gene2,pmid,kind\na,b,1999,x\nb,c,2001,y\n", says=("line 1", "names no weight")),
+    Input("g.csv", "voter,candidate,vote\na,b,1\nb,c,-1\n", "b>a=1 c>b=-1", how={"orientation": "listens"}),
+    Input("g.csv", "user,account,score\na,b,1\nb,c,-1\n", "b>a=1 c>b=-1", how={"orientation": "listens"}),
+    *(
+        Input("g.json", f'{{{say}, "links": [{{"source": "a", "target": "b", "weight": 2}}]}}', says=("--undirected",))
+        for say in ('"undirected": true', '"graph": {"directed": false}')
+    ),
+]
 INPUTS = [
     *(SIGNS + UNKNOWN_SIGNS + DIRECTIONS + SIGNS_BESIDE + ORDINARY + LAPLACIANS + ROWS + MATRICES + FORMATS + OTHERS),
     *NUMBERS_AND_ATTRIBUTES,
@@ -813,6 +862,7 @@ INPUTS = [
     *TITLES_AND_WORDS,
     *NODES_AND_COMMENTS,
     *LAPLACIANS_OF_EDGES,
+    *WORDS_OR_TITLES,
 ]
 
 

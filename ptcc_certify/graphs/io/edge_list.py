@@ -18,7 +18,7 @@ from ptcc_certify.graphs.io.files import lines_of
 from ptcc_certify.graphs.io.problems import Problem, Problems, one_message
 from ptcc_certify.graphs.io.raw_edges import DECIMALS, HEADER_MEND, Beside, Draft, Numbers, Rows, Signs
 from ptcc_certify.graphs.io.signs import WEIGHT, plain, sign_of_word
-from ptcc_certify.graphs.io.table_columns import Columns, asks_of_corner, columns_of, names_edges, turns_edges
+from ptcc_certify.graphs.io.table_columns import Columns, asks_of_corner, columns_of, columns_of_comment, names_edges
 from ptcc_certify.graphs.io.text_matrices import bracketed_matrix, is_entry, table_as_matrix
 from ptcc_certify.graphs.labels import first_five, ordered_labels
 from ptcc_certify.graphs.rationals import parse_exact, shorten
@@ -30,6 +30,16 @@ _SEPARATORS = ("\t", ",", ";", None)  # None: blanks
 _LOOKED_AT, _EXTRA, _SIGN_AT = 20, 10**5, {"first": "2,3,1", "second": "1,3,2"}
 #: From this number on a number after the third column is taken for a year or a time.
 _TIMES = 1900
+#: What comments say of undirected edges: a title, a value, a graph that is; and what is no such statement.
+_NO_VALUE = r"\s*[=:]?\s*(false|no?|0)\b"
+_UNDIRECTED = re.compile(
+    r"^[\s#%]*undirected\b|[:=,;]\s*undirected[\s.;,]*$|\b(an?|is|are)( \w+)? undirected\b"
+    rf"|directed( graph)?{_NO_VALUE}",
+    re.IGNORECASE,
+)
+_OF_OTHERS = re.compile(
+    rf"undirected{_NO_VALUE}|\bnot\b|\b(was|were|been|replaced|dropped|removed|converted)\b", re.IGNORECASE
+)
 #: From this number on whole weights throughout are taken for seconds since 1970.
 _SECONDS = 10**8
 
@@ -177,16 +187,13 @@ def _is_row_of_edges(comment: str) -> bool:
 
 def direction_of_comments(data: bytes, name: str) -> str:
     """Return what comments before the first row say of undirected edges, as KONECT and SNAP do; "" if nothing."""
-    for line in data[:2000].decode("utf-8", "replace").removeprefix("\ufeff").splitlines():
-        if line.strip()[:1] not in "#%":
-            break
+    for number, line in enumerate(comments_above(data), 1):
         if konect := re.match(r"\s*%\s*(sym|asym|bip)\b", line):
             if konect[1] == "bip":
                 mend = "give the nodes of each its own names, such as u1 and v1, and leave out this line"
-                raise FormatError(f"{name}, line 1: % bip: two sets of nodes share their numbers; {mend}")
+                raise FormatError(f"{name}, line {number}: % bip: two sets of nodes share their numbers; {mend}")
             return "% sym" if konect[1] == "sym" else ""
-        no = r"\s*[=:]\s*(false|no|0)\b"
-        if re.match(rf"\s*[#%]\s*(undirected\b(?!{no})|directed{no})", line, re.IGNORECASE):
+        if _UNDIRECTED.search(line) and not _OF_OTHERS.search(line):
             return f"the comment {shorten(line.strip())}"
     return ""
 
@@ -304,17 +311,36 @@ def _refuse_titles(row: list[str], place: str, data: bytes) -> None:
 def _refuse_titles_of_comments(data: bytes, name: str, width: int) -> None:
     """Refuse rows without a header whose columns a comment names in another order, as numpy.savetxt writes it.
 
-    It has as many words as rows have fields, and one for an end and for the weight; other comments are prose.
+    It has as many titles as rows have fields, between commas, tabs or semicolons if there are any, else between
+    blanks; what stands before a colon is none of them.
     """
-    for line in data[:2000].decode("utf-8", "replace").removeprefix("\ufeff").splitlines():
-        if line.strip()[:1] not in "#%":
-            break
-        titles = [title.strip("\"'") for title in re.split(r"\s*[,;\t ](?![^(]*\))\s*", line.strip(" \t#%"))]
+    for line in comments_above(data):
+        text = re.sub(r"^[\s#%]*(\w+\s*:)?\s*", "", line).rstrip()
+        separator = next((mark for mark in ",;\t" if mark in text), " ")
+        titles = [title.strip(" \"'") for title in re.split(rf"\s*{separator}\s*(?![^(]*\))", text)]
         if len(titles) != width or len(set(map(plain, titles))) < width:
             continue
-        if turns_edges(titles, name):
-            mend = f"remove {line.strip()[0]} before {shorten(titles[0])}, or tell them: --columns 1,2,3"
+        if columns := columns_of_comment(titles, name):
+            mend = f"remove {line.strip()[0]} before {shorten(titles[0])}, or tell them: --columns {columns}"
             raise FormatError(f"{name}: a comment names the columns; {mend}")
+
+
+def comments_above(data: bytes) -> Iterator[str]:
+    r"""Yield the lines above the first row, which are comments or empty.
+
+    Examples
+    --------
+    >>> [*comments_above(b"# a\n\n%b\n1,2,1\n# c\n")]
+    ['# a', '', '%b']
+    """
+    begins, text = 0, data.removeprefix(b"\xef\xbb\xbf")
+    while begins < len(text):
+        ends = text.find(b"\n", begins) + 1 or len(text)
+        line = text[begins:ends].decode("utf-8", "replace").rstrip("\r\n")
+        if line.strip()[:1] not in "#%":
+            return
+        yield line
+        begins = ends
 
 
 def _refuse_ambiguous(draft: EdgeList, rows: Rows, data: bytes, konect: bool) -> None:

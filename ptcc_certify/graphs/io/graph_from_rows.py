@@ -389,6 +389,15 @@ class _Draft:
         mend = "remove it or give a weight, or drop all with {}"
         self.problems.append(Problem(self.rows.where(int(rows[0])), text, mend, "drop_zeros"))
 
+    def mirrored(self, first: np.ndarray) -> bool:
+        """Tell whether rows repeat ``first`` ones once, the other way, with equal weights, which a sum would double."""
+        later = np.flatnonzero(first != np.arange(first.size))
+        first = first[later]
+        values = [[self.values[code] for code in self.codes[rows].tolist()] for rows in (first, later)]
+        turned = (self.source[first] == self.target[later]) & (self.source[first] != self.source[later])
+        once = np.unique(first).size == first.size
+        return once and bool(turned.all()) and values[0] == values[1] and (self.rows.in_order or bool(self.undirected))
+
     def merge_duplicates(self) -> tuple[str, ...]:
         """Tell or merge the rows of one pair (of one unordered pair, if edges go both ways); note how many."""
         duplicates = self.how.duplicates
@@ -405,8 +414,9 @@ class _Draft:
             earlier = self.rows.where(int(self.row[first[pair[second]]])) or "an earlier one"
             which = f"{self.edge(second)} (the first is {earlier})" if self.name else self.edge(second)
             text = f"{'second row for edge' if self.name else 'two edges'} {which}{in_all(repeated)}"
+            which = "last" if undirected and self.mirrored(first[pair]) else "sum|last"
             mend = "keep one, or merge with {}"
-            self.problems.append(Problem(self.rows.where(int(self.row[second])), text, mend, "duplicates sum|last"))
+            self.problems.append(Problem(self.rows.where(int(self.row[second])), text, mend, f"duplicates {which}"))
             return ()
         if duplicates == "last":
             if undirected and not self.undirected and not self.rows.in_order:

@@ -42,8 +42,7 @@ def read_json(data: bytes, name: str, how: Reading) -> Rows:
     links, nodes = document[found[0]], document.get("nodes", [])
     if not isinstance(nodes, list) or not all(isinstance(one, dict) for one in links):
         raise FormatError(f"{name}: nodes or {found[0]} of the JSON are no lists of objects; {_FORM}")
-    if document.get("directed", True) not in (True, False):
-        raise FormatError(f"{name}: directed is neither true nor false; write one")
+    undirected = _undirected(document, name)
     told = [one.get(end) for one in links for end in ("source", "target")]
     labels, number = _nodes(nodes, [end for end in told if isinstance(end, str)], name)
     ends = []
@@ -54,9 +53,21 @@ def read_json(data: bytes, name: str, how: Reading) -> Rows:
         [(key, value) for key, value in one.items() if key not in ("source", "target", "key")] for one in links
     ]
     rows = attribute_rows(labels, ends, data_of_links, name, how)
-    rows.undirected = "" if document.get("directed", True) else '"directed": false'
+    rows.undirected = undirected
     rows.where = lambda row: f"{found[0]}[{row}]"
     return rows
+
+
+def _undirected(document: dict[str, Any], name: str) -> str:
+    """Return what says that links have no direction, of the whole or beside what else is told of the graph, or ""."""
+    beside = document.get("graph")
+    for told in (document, beside if isinstance(beside, dict) else {}):
+        for key, usual in (("directed", True), ("undirected", False)):
+            if told.get(key, usual) not in (True, False):
+                raise FormatError(f"{name}: {key} is neither true nor false; write one")
+            if told.get(key, usual) != usual:
+                return f'"{key}": {json.dumps(told[key])}'
+    return ""
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

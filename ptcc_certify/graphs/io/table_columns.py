@@ -32,13 +32,17 @@ _HEARD = r"listens|hears|speaker|heard|followee|followed|rated|trustee|trusted|s
 _REST = r"(node|vertex|gene|protein|agent|id|name|label|index)*"
 _STARTS = (rf"(source|src|from){_REST}", rf"(start|origin|orig|tf|transcriptionfactor|regulator|influencer){_REST}")
 _ENDS = (rf"(target|tgt|dst|to){_REST}", rf"(end|dest|destination|influenced|regulated){_REST}")
-#: Titles of what is no node.
-_NO_END = r"|\W*|\d+|no|nr|id|idx|index|row|key|x|unnamed.*|(edge|link|row)(id|nr|no)?|.*(time|date|year|stamp|count)"
+#: Titles of times; of what is no node, and of what is no weight.
+_TIME = r"(?!.*(candid|mand)ate).*(time|date|year|stamp)"
+_NO_END = rf"|\W*|\d+|no|nr|id|idx|index|row|key|x|unnamed.*|(edge|link|row)(id|nr|no)?|{_TIME}|.*(?<!ac)(?<!vis)count"
+_NO_WEIGHT = rf"{_TIME}|(edge|link|row|pm|pubmed|article|paper|study)?id|doi"
 #: Two titles that say nothing of a direction, the first is then who is heard: Gene1 and Gene2, a and b.
 _NEUTRAL = r"(?P<what>.*?)(1.(?P=what)2|a.(?P=what)b|i.(?P=what)j|u.(?P=what)v|s.(?P=what)t|0.(?P=what)1)(?P<rest>\w*)"
 #: Titles of weights that are entries of a matrix, where k may listen to l: a_kl, w(i,j).
 _OF_MATRIX = r"[alw]\W?(ij|i,j|kl|k,l|uv|u,v)\W?"
 _NO_TITLE = re.compile(r"nan|na|n/?a|none|null|inf|infinity|true|false|unknown|x|\?*", re.IGNORECASE)
+#: What is to be done where no column is known to be the weight.
+_TELL_ALL = "name one column weight, sign or rating, or tell the three: --columns source,target,NAME"
 #: The note of a file whose header puts source and target elsewhere than source first.
 BY_HEADER = "columns by header"
 #: The note of a file whose raters were read as those who are heard.
@@ -108,13 +112,17 @@ def columns_of(first: Sequence[str], others: Sequence[Sequence[str]], place: str
     if edge_columns(titles, place) is not None:
         return named_columns(titles, place)
     weight, sign = weight_and_sign(titles, place)
-    if len(titles) < 3 or not _is_header(titles, weight if weight is not None else 2, others):
+    if len(titles) < 3 or not _is_header(titles, weight if weight is not None else 2, others, place):
         return Columns()
     _refuse_family(titles, place)
     weight = 2 if weight is None else weight
     source, target, known = _ends(titles, place)
     if not {source, target}.isdisjoint({weight, sign}):
         raise FormatError(f"{place}: {_no_ends(titles)}")
+    if {source, target} == {0, 1}:
+        _refuse_wide(titles, others, place)
+    if re.fullmatch(_NO_WEIGHT, plain(titles[weight])):
+        raise FormatError(f"{place}: the header names no weight; {_TELL_ALL}")
     asks = _direction(titles[source], titles[target], titles[weight], known, place)
     return Columns(source, target, weight, sign, titles, False, (_note(titles, source, target, weight),), asks, True)
 
@@ -143,6 +151,18 @@ def _ends(titles: Sequence[str], place: str) -> tuple[int, int, bool]:
     if any(re.fullmatch(_NO_END, written[k]) and len(titles[k]) != 1 for k in (source, target)):
         raise FormatError(f"{place}: {_no_ends(titles)}")
     return source, target, found != [None, None]
+
+
+def _refuse_wide(titles: Sequence[str], others: Sequence[Sequence[str]], place: str) -> None:
+    """Refuse a matrix whose columns have other names than its rows: the second column has entries and no nodes."""
+    rows = [[field.strip() for field in row] for row in others if len(row) == len(titles)]
+    named = not all(is_number(row[0]) for row in rows)
+    if not (rows and named and all(is_entry(text) for row in rows for text in row[1:] if text)):
+        return
+    ends = {row[1] for row in rows}
+    if ends <= {"0", "1", ""} or not all(text.isdigit() for text in ends):
+        what = "looks like a matrix with names, and its rows and columns have different ones"
+        raise FormatError(f"{place}: {what}; give both the same, or write rows of edges")
 
 
 def _no_ends(titles: Sequence[str]) -> str:
@@ -174,8 +194,7 @@ def named_columns(titles: Sequence[str], place: str) -> Columns:
         if len(rest) == 1 and re.match(r"[^\W\d_]", titles[rest[0]]) and sign_of_word(titles[rest[0]]) == 1:
             note = _note(titles, source, target, rest[0])
             return Columns(source, target, rest[0], titles=tuple(titles), notes=(note,), guessed=True)
-        mend = "name one column weight, sign or rating, or tell the three: --columns source,target,NAME"
-        raise FormatError(f"{place}: the header names no weight; {mend}")
+        raise FormatError(f"{place}: the header names no weight; {_TELL_ALL}")
     notes = [BY_HEADER] if source > 0 else []
     if plain(titles[source]) == "rater":
         notes.append(RATERS)
@@ -195,29 +214,46 @@ def _told(titles: tuple[str, ...], others: Sequence[Sequence[str]], place: str, 
             raise FormatError(f'{place}: no column "{shorten(wanted)}"; the first row has {there}')
         at.append(k)
     by_title = not all(wanted.isdigit() for wanted in how.titles)
-    if not by_title and edge_columns(titles, place) is None and not _is_header(titles, at[2], others):
+    if not by_title and edge_columns(titles, place) is None and not _is_header(titles, at[2], others, place):
         return Columns(at[0], at[1], at[2], told=True, notes=(_note(how.titles, 0, 1, 2),))
     return Columns(at[0], at[1], at[2], titles=titles, told=True, notes=(_note(titles, *at),))
 
 
-def turns_edges(titles: Sequence[str], place: str) -> bool:
-    """Tell whether titles that stand in a comment say another direction than source first, or who listens.
+def columns_of_comment(titles: Sequence[str], place: str) -> str:
+    """Return the columns of source, target and weight that titles in a comment tell, from 1; "" of the usual three.
+
+    Titles name both ends, or one, and a weight; other comments are prose.
 
     Examples
     --------
-    >>> turns_edges(["follower", "leader", "weight"], ""), turns_edges(["source", "target", "weight"], "")
-    (True, False)
+    >>> columns_of_comment(["follower", "leader", "weight"], ""), columns_of_comment(["source", "target", "weight"], "")
+    ('2,1,3', '')
     """
     written = [plain(title) for title in titles]
-    ends = edge_columns(titles, place)
-    if ends is not None:
-        return ends[2] is not None and (ends[:2] != (0, 1) or written[0] == "rater")
+    source, target, _ = edge_columns(titles, place) or (None, None, None)
+    if source is not None and target is not None:
+        turned = written[source] == "rater"
+        rest = [k for k in range(len(titles)) if k not in (source, target)]
+        if not turned and ((source, target) == (0, 1) or not rest):
+            return ""
+        weight = next((k for k in rest if _tells_weight(titles[k])), rest[0])
+        if turned or {source, target} == {0, 1} or _tells_weight(titles[weight]):
+            return ",".join(str(k + 1) for k in ((target, source) if turned else (source, target)) + (weight,))
+        return ""
     if len(titles) < 3:
-        return False
+        return ""
     listens, heard = "|".join((rf"({_LISTENERS}){_REST}", *_ENDS)), "|".join((rf"({_HEARD}){_REST}", *_STARTS))
-    turned = re.fullmatch(listens, written[0]) or re.fullmatch(heard, written[1])
-    weight = any(names_edges([title]) or is_size(title) or is_signed(title) for title in titles[2:])
-    return bool(turned and weight) or re.fullmatch(_OF_MATRIX, written[2]) is not None
+    turned = bool(re.fullmatch(listens, written[0]) or re.fullmatch(heard, written[1]))
+    weights = [k for k in range(2, len(titles)) if _tells_weight(titles[k])]
+    if re.fullmatch(_OF_MATRIX, written[2]):
+        weights, turned = [2], True
+    return f"2,1,{weights[0] + 1}" if turned and weights else ""
+
+
+def _tells_weight(title: str) -> bool:
+    """Tell whether a word in a comment is the title of a weight or a sign, or one for a sign; plurals are prose."""
+    size = (is_size(title) or is_signed(title)) and not title.lower().endswith(("s", "ed"))
+    return size or names_edges([title]) or sign_of_word(title) is not None
 
 
 def asks_of_corner(corner: str, line: str) -> str:
@@ -235,19 +271,39 @@ def asks_of_corner(corner: str, line: str) -> str:
     return f"{line}: the corner {shorten(corner)} says that rows are heard; {mend}"
 
 
-def _is_header(titles: Sequence[str], weight: int, others: Sequence[Sequence[str]]) -> bool:
+def _is_header(titles: Sequence[str], weight: int, others: Sequence[Sequence[str]], place: str) -> bool:
     """Tell whether a row is of titles: where all others have a number, or a sign, it has a word that is none.
 
-    The word may be one for a sign, such as Trust, beside a title of an end and above numbers or signs.
+    The word may be one for a sign, such as Trust, see :func:`_is_title`.
     """
     title = titles[weight]
     if not re.match(r"[^\W\d_]", title) or _NO_TITLE.fullmatch(title):
         return False
     below = [row[weight].strip() for row in others if len(row) > max(weight, 1)]
     if is_entry(title):
-        words = "|".join((_LISTENERS, _HEARD, *_STARTS, *_ENDS))
-        return any(re.fullmatch(words, plain(end)) for end in titles[:2]) and bool(below) and all(map(is_entry, below))
+        nodes = {field.strip() for row in others for field in row[:2]}
+        return bool(below) and nodes.isdisjoint(titles[:2]) and _is_title(titles, title, below, place)
     return bool(below) and (all(map(is_entry, below)) or (is_sign(title) and all(below)))
+
+
+def _is_title(titles: Sequence[str], title: str, below: Sequence[str], place: str) -> bool:
+    """Tell whether a word for a sign is a title: above numbers and symbols; above words, where both ends have titles.
+
+    Where one end alone has a title, or both are numbered above the same word, it may be either; verbs are none.
+    """
+    if not all(map(is_entry, below)):
+        return False
+    if not any(re.match(r"[^\W\d_]", text) for text in below):
+        return True
+    words = "|".join((_LISTENERS, _HEARD, *_STARTS, *_ENDS))
+    ends = [re.fullmatch(words, plain(end)) is not None for end in titles[:2]]
+    numbered = re.fullmatch(_NEUTRAL, " ".join(map(plain, titles[:2]))) is not None and len(titles[0]) > 1
+    if title.lower().endswith("s") or not (any(ends) or numbered):
+        return False
+    if not all(ends) and (any(ends) or title.lower() in map(str.lower, below)):
+        what = f"{', '.join(map(shorten, titles[:3]))} are titles, or an edge?"
+        raise FormatError(f"{place}: {what} Name who is heard source, who listens target, and the weight weight")
+    return True
 
 
 def _note(titles: Sequence[str], *columns: int) -> str:
