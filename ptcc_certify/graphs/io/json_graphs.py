@@ -89,8 +89,8 @@ def _refuse_names(nodes: list[dict[str, Any]], ends: list[str], name: str) -> No
     """Refuse integers at the ends of links that are names of nodes without an id, and positions of others."""
     for title in _NAMES:
         names = [lower_case(one).get(title) for one in nodes]
-        integers = all(isinstance(one, _Integer) for one in names)
-        if integers and {*ends} <= {*names} and any(names[int(end) : int(end) + 1] != [end] for end in ends):
+        integers, called = all(isinstance(one, _Integer) for one in names), {*ends}
+        if integers and called <= {*names} and any(str(k) in called and str(k) != one for k, one in enumerate(names)):
             what = f"links call nodes by integers that are positions, or {title}s?"
             raise FormatError(f"{name}: {what} Give each node its own id, and name the ends of links by these")
 
