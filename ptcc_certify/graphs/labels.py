@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _INTEGER_LABEL = re.compile(r"-?[0-9]{1,18}", re.ASCII)
+#: Labels of a column of whole numbers in which some are missing.
+_NUMBER_OR_GAP = r"-?[0-9]+(\.0+)?|n/?a|nan|null|none"
 
 
 def position(label: Hashable, labels: Sequence[str]) -> int:
@@ -88,23 +90,28 @@ def refuse_unnamed(node: Any, where: str) -> None:
         raise GraphError(f"{where} names no node ({node}); leave it out or name the node")
 
 
-def refuse_written_twice(labels: Sequence[str], place: str) -> None:
+def refuse_written_twice(labels: Sequence[str], place: str) -> tuple[str, ...]:
     """Refuse nodes such as 2 and 2.0, which a column of numbers becomes where a field of it is empty.
+
+    Beside names, or fractions as versions 2.1 and 2.2 are, they may be two: a note tells that.
 
     Examples
     --------
+    >>> refuse_written_twice(["2", "2.0", "2.1"], "a.csv")
+    ('2 and 2.0 are two nodes',)
     >>> refuse_written_twice(["1", "2", "2.0"], "a.csv")
     Traceback (most recent call last):
     ptcc_certify.errors.FormatError: a.csv: nodes 2 and 2.0 are one number written in two ways; write it in one
     """
     there = set(labels)
-    if not all(re.fullmatch(r"-?[0-9]+(\.0+)?", label) for label in there):
-        return  # names, such as those of versions
-    for label in labels:
-        whole, _, zeros = label.partition(".")
-        if zeros and whole in there:
-            what = f"nodes {shorten(whole)} and {shorten(label)} are one number written in two ways; write it in one"
-            raise FormatError(f"{place}: {what}") if place else GraphError(what)
+    again = [label for label in labels if re.fullmatch(r"-?[0-9]+\.0+", label) and label.partition(".")[0] in there]
+    if not again:
+        return ()
+    both = f"{shorten(again[0].partition('.')[0])} and {shorten(again[0])}"
+    if not all(re.fullmatch(_NUMBER_OR_GAP, label, re.IGNORECASE) for label in there):
+        return (f"{both} are two nodes",)
+    what = f"nodes {both} are one number written in two ways; write it in one"
+    raise FormatError(f"{place}: {what}") if place else GraphError(what)
 
 
 def labels_beside(values: Any) -> list[str] | None:

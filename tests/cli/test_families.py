@@ -413,7 +413,8 @@ BAD = {
     "one end": (_rows("a,b,1", header="source,target,weight_min"), (), "one end of the intervals"),
     "no number": (_rows("a,b,1,x"), (), 'line 2: edge a -> b: "x" is not a number'),
     "empty end": (_rows("a,b,,2"), (), "line 2: edge a -> b"),
-    "not finite": (_rows("a,b,nan,2"), (), "not a finite number"),
+    "missing end": (_rows("a,b,nan,2"), (), 'line 2: edge a -> b has no weight; add one in column "weight_min"'),
+    "not finite": (_rows("a,b,-inf,2"), (), "not a finite number"),
     "no weight": (_rows("a,b,yes", header="source,target,optional"), (), "names no weight"),
     "answer": (
         _rows("a,b,1,perhaps", header="source,target,weight,optional"),

@@ -1486,3 +1486,160 @@ def test_notes_on_columns_are_not_cut_but_for_the_names_of_those_that_are_no_sig
     assert ignored.endswith("...")
     short = run("classify", str(put(tmp_path, "s.csv", "RATER,RATEE,RATING,TIME\n1,2,4,99\n2,1,-4,98\n"))).out
     assert "raters listen? --edges listens" in short and 'columns ignored: "TIME"' in short
+
+
+def half_of_a_laplacian(name: str) -> bytes:
+    """Write a Laplacian whose entries beside the diagonal stand once, in a format that the ending tells."""
+    entries = {(0, 0): 2, (0, 1): -1, (0, 2): 1, (1, 1): 3, (1, 2): -2, (2, 2): 3}
+    file, graph = io.BytesIO(), nx.Graph()
+    graph.add_weighted_edges_from((str(u), str(v), weight) for (u, v), weight in entries.items())
+    whole = np.array([[entries[min(u, v), max(u, v)] for v in range(3)] for u in range(3)], dtype=float)
+    if name.endswith(".mtx"):
+        mmwrite(file, sparse.coo_array(whole), symmetry="symmetric")
+    elif name.endswith(".npy"):
+        np.save(file, np.triu(whole))
+    elif name.endswith(".csv"):
+        file.write("".join(f"{u},{v},{weight}\n" for (u, v), weight in entries.items()).encode())
+    else:
+        write = {"gml": nx.write_gml, "graphml": nx.write_graphml, "gexf": nx.write_gexf, "net": nx.write_pajek}
+        write[name.rpartition(".")[2]](graph, file)
+    return file.getvalue()
+
+
+@pytest.mark.parametrize("name", ["L.mtx", "L.npy", "L.csv", "L.gml", "L.graphml", "L.gexf", "L.net"])
+def test_a_laplacian_whose_entries_stand_once_asks_for_both_directions(tmp_path, name):
+    path = put(tmp_path, name, half_of_a_laplacian(name))
+    with pytest.raises(FormatError, match="as a Laplacian's; read it with --laplacian --undirected, or add --no-lapl"):
+        read_graph(path)
+    with pytest.raises(FormatError, match="means undirected edges; let each go both ways with --undirected"):
+        read_graph(path, laplacian=True)
+    graph = read_graph(path, laplacian=True, undirected=True)
+    a, b, c = graph.labels
+    assert told(graph) == expected(f"{a}>{b}=1 {b}>{a}=1 {a}>{c}=-1 {c}>{a}=-1 {b}>{c}=2 {c}>{b}=2")
+
+
+def test_a_laplacian_among_the_edges_of_a_table_is_mended_as_the_table_is_read():
+    edges = [("a", "a", 1), ("b", "b", 1), ("a", "b", -1), ("b", "a", -1)]
+    table = pd.DataFrame(edges, columns=["source", "target", "weight"])
+    with pytest.raises(GraphError, match=r"read it with as_graph\(.., laplacian=True\), or add laplacian=False"):
+        ptcc.as_graph(table)
+    assert told(ptcc.as_graph(table, laplacian=True)) == expected("a>b=1 b>a=1")
+    assert told(ptcc.as_graph(table, laplacian=False, drop_self_loops=True)) == expected("a>b=-1 b>a=-1")
+
+
+@pytest.mark.parametrize(
+    "corner",
+    ["From To", "from_to", "from→to", "from vs to", "source target", "source-target", "Source (rows)", "rows: from"],
+)
+def test_a_corner_that_says_from_in_any_spelling_asks_for_the_direction(tmp_path, corner):
+    path = put(tmp_path, "g.csv", f"{corner},a,b\na,0,2\nb,-1,0\n")
+    with pytest.raises(FormatError, match=r"the corner .* says that rows are heard"):
+        read_graph(path)
+
+
+def test_a_corner_that_says_to_first_is_one_of_listeners(tmp_path):
+    path = put(tmp_path, "g.csv", "to from,a,b\na,0,2\nb,-1,0\n")
+    assert told(read_graph(path)) == expected("b>a=2 a>b=-1")
+
+
+def test_a_matrix_whose_corner_asks_is_read_as_another_was(tmp_path):
+    path = put(tmp_path, "g.csv", "from,a,b\na,0,2\nb,-1,0\n")
+    whole = read_graph(put(tmp_path, "h.csv", "to,a,b\na,0,2\nb,-1,0\n"))
+    assert read_graph(path, **keywords_as(path, whole.read)) == whole
+    certificate = str(tmp_path / "c.json")
+    run("certify", str(tmp_path / "h.csv"), "--no-simulation", "-o", certificate)
+    checked = run("check", certificate, str(path), "--edges", "information")
+    assert "another graph" in checked.out + checked.err and "--edges listens" in checked.out + checked.err
+
+
+INTERVALS = {
+    "source,target,weight,weight_min,weight_max\na,b,1,0,2\nb,a,1,NA,NA\n": [(1, 1), (0, 2)],
+    "source,target,weight,weight_min,weight_max\na,b,n/a,0,2\nb,a,1,,\nc,,NA,NA,NA\n": [(1, 1), (0, 2)],
+    "source,target,weight,optional\na,b,1,1\nb,a,2,\n": [(2, 2), (0, 1)],
+    "source,target,sign,optional\na,b,activates,yes\nb,a,inhibits,\nc,,,\n": [(-1, -1), (0, 1)],
+}
+
+
+@pytest.mark.parametrize("content", INTERVALS)
+def test_a_file_of_intervals_and_its_table_are_the_same_family(content):
+    texts = pd.read_csv(io.StringIO(content), dtype=str, keep_default_na=False)
+    for family in (
+        read_family(io.StringIO(content)),
+        ptcc.as_family(pd.read_csv(io.StringIO(content))),
+        ptcc.as_family(texts),
+    ):
+        assert [family.modes[0].edge_interval(k) for k in (0, 1)] == INTERVALS[content]
+
+
+def test_codes_of_relations_are_refused_beside_a_node_alone_of_a_table():
+    table = pd.read_csv(io.StringIO("source,target,type,optional\na,b,1,yes\nb,a,2,\nc,,,\n"))
+    with pytest.raises(GraphError, match="codes of relations"):
+        ptcc.as_family(table)
+
+
+@pytest.mark.parametrize(
+    ("attributes", "interval"),
+    [({"sign": "inhibits"}, (-1, 0)), ({"weight": "activates"}, (0, 1)), ({"Weight": 2}, (0, 2))],
+)
+def test_networkx_edges_that_may_fail_have_their_weights_under_any_title_of_weights(attributes, interval):
+    graph = nx.DiGraph()
+    graph.add_edge("a", "b", **attributes, optional=True)
+    assert ptcc.as_family(graph).modes[0].edge_interval(0) == interval
+
+
+@pytest.mark.parametrize("row", ["1956 activates 2885 0.93", "1 + 2 -0.3", "1\tactivates\t2\t3\t1.0"])
+def test_a_score_beside_nodes_with_numbers_is_no_target(tmp_path, row):
+    with pytest.raises(FormatError, match="is a score, not a target"):
+        read_graph(put(tmp_path, "g.sif", f"{row}\n"))
+    assert read_graph(put(tmp_path, "h.sif", "1956 activates 2885 207\n")).n_edges == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("g.csv", "source,target,weight,is_conflict\na,b,2,1\nb,a,1,0\n"),
+        ("g.csv", "source,target,weight,conflict\na,b,2,yes\nb,a,1,no\n"),
+        ("g.csv", "source,target,weight,cooperation\na,b,2,0\nb,a,1,1\n"),
+        ("g.json", '{"links": [{"source": 0, "target": 1, "weight": 2, "conflict": true}]}'),
+    ],
+)
+def test_conflict_and_cooperation_beside_positive_weights_may_be_signs(tmp_path, name, content):
+    with pytest.raises(FormatError, match="are these signs"):
+        read_graph(put(tmp_path, name, content))
+
+
+def test_a_number_that_nodes_write_in_two_ways_is_told_beside_names(tmp_path):
+    with pytest.raises(FormatError, match=r"1 and 1\.0 are one number"):
+        read_graph(put(tmp_path, "g.csv", "source,target,weight\n1.0,2,1\n1,NA,-1\n"))
+    named = put(tmp_path, "g.csv", "source,target,weight\n1.0,2,1\n1,ann,-1\n")
+    assert "1 and 1.0 are two nodes" in read_graph(named).read["notes"]
+    bounds = "source,target,weight_min,weight_max\n1,1.0,1,2\n1.0,1.1,-1,0\n"
+    assert "1 and 1.0 are two nodes" in read_family(io.StringIO(bounds)).notes
+    assert "1 and 1.0 are two nodes" in ptcc.as_family([(1, "1.0", 1, 2), ("1.0", "1.1", -1, 0)]).notes
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("g.csv", "source,target,type\na,b,1.1\nb,a,2.3\n"),
+        ("g.gml", "graph [ directed 1 node [ id 0 ] node [ id 1 ] edge [ source 0 target 1 type 1.1 ] ]"),
+        ("g.json", '{"links": [{"source": 0, "target": 1, "type": 0.5}]}'),
+        ("g.sif", "a\t0.5\tb\n"),
+    ],
+)
+def test_fractions_under_a_title_of_relations_are_no_weights_in_silence(tmp_path, name, content):
+    with pytest.raises(FormatError, match="codes of relations, not signs"):
+        read_graph(put(tmp_path, name, content))
+
+
+@pytest.mark.parametrize("content", ["source,target,type\na,b,1.1\nb,a,-2\n", "source,target,mor\na,b,1.1\nb,a,2\n"])
+def test_fractions_beside_a_negative_number_or_modes_of_regulation_are_weights(tmp_path, content):
+    assert read_graph(put(tmp_path, "g.csv", content)).weights[0] in (2, -2)
+
+
+def test_integers_of_json_that_are_names_and_positions_of_other_nodes_are_refused(tmp_path):
+    nodes = '{"name": 2}', '{"name": 0}', '{"name": 1}'
+    with pytest.raises(FormatError, match="positions, or names"):
+        read_graph(put(tmp_path, "g.json", named_nodes("0>1", *nodes)))
+    graph = read_graph(put(tmp_path, "g.json", named_nodes("0>1", '{"name": 0}', '{"name": 1}')))
+    assert told(graph) == expected("0>1=-1")

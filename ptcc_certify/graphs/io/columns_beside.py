@@ -23,11 +23,11 @@ _BACK_WORDS = ("back", "backward", "backwards", "reverse", "reversed", "both", "
 #: Titles of columns whose yes is a minus, whose no is one, and of columns with signed numbers.
 _MINUS = (
     r"neg(?!oti)|inhib|repress|suppress|antagon|enem[iy]|foe|oppos|opponent|hostil|(?<!ar)rival|distrust|dislike|minus|"
-    r"down(regul|$)|disagree"
+    r"down(regul|$)|disagree|conflict"
 )
 _PLUS = (
     r"pos(itive|$)|activat|excit|promot|stimul|induc|^all(y|ies|iance)|friend|(?<!dis)trust|(?<!dis)like(?!li)|plus|"
-    r"(?<!dis)agree|upregul"
+    r"(?<!dis)agree|upregul|(?<!un)(?<!non)cooperat"
 )
 _SIGNED = r"(?<!de)(?<!as)sign(?!if|al)|sgn|polarity|valence|attitude|stance|effect|mode$"
 _SIZES = r"weight|rating|value|score|strength|trust|coef|corr|influence|beta|^w$"

@@ -16,14 +16,14 @@ from ptcc_certify.graphs.family import Family, read_share
 from ptcc_certify.graphs.io.columns_beside import column_of, notes_on_ignored, signs_beside_intervals
 from ptcc_certify.graphs.io.family_files import read_family
 from ptcc_certify.graphs.io.graph_files import read_as
-from ptcc_certify.graphs.io.interval_edges import TWICE, Entry, absent, told_weights
+from ptcc_certify.graphs.io.interval_edges import TWICE, Entry, absent, known, told_weights
 from ptcc_certify.graphs.io.interval_rows import IntervalRows, is_family_file, take
 from ptcc_certify.graphs.io.packaged import GRAPHS, file_or_packaged
 from ptcc_certify.graphs.io.problems import Problems, one_message
 from ptcc_certify.graphs.io.raw_edges import Beside, Nodes, Rows, Signs, distinct, rows_of
-from ptcc_certify.graphs.io.signs import interval_columns, is_sign
+from ptcc_certify.graphs.io.signs import interval_columns, is_sign, weight_and_sign
 from ptcc_certify.graphs.io.table_columns import BY_HEADER, RATERS, Columns, columns_of, edge_columns
-from ptcc_certify.graphs.labels import first_five, labels_beside
+from ptcc_certify.graphs.labels import first_five, labels_beside, refuse_written_twice
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
 
@@ -161,7 +161,7 @@ def _rows_of_table(table: Any, how: Reading) -> Rows | None:
         [*table[table.columns[columns.weight]]],
         beside,
     )
-    rows.notes = tuple(note for note in columns.notes if note not in (BY_HEADER, RATERS))
+    rows.table, rows.notes = True, tuple(note for note in columns.notes if note not in (BY_HEADER, RATERS))
     return rows
 
 
@@ -251,7 +251,8 @@ def as_family(family: Any, orientation: str | None = None, *, uncertainty: Any =
         return read_family(file_or_packaged(os.fspath(family)), uncertainty=uncertainty, orientation=orientation)
     if (rows := _interval_rows(family, uncertainty)) is not None:
         made = Family.from_intervals(rows.edges, rows.nodes, orientation=orientation or "information")
-        return replace(made, notes=(*made.notes, *rows.notes))
+        alike = refuse_written_twice(made.modes[0].labels, "")
+        return replace(made, notes=(*made.notes, *rows.notes, *alike))
     return Family.from_graph(as_graph(family, orientation), uncertainty=uncertainty)
 
 
@@ -337,7 +338,7 @@ def _entries_of_table(table: Any) -> _Told | None:
     read = (*ends, low, high, may_fail)
     m = len(table)
     columns = [[None] * m if k is None else list(table[table.columns[k]]) for k in read]
-    columns[:2] = map(_whole_numbers, columns[:2])
+    columns = [*map(_whole_numbers, columns[:2]), *([*map(known, column)] for column in columns[2:])]
     if low is None and ends[2] is not None:
         columns[2] = told_weights(columns[2], names[ends[2]])
     others = [k for k in range(len(names)) if k not in read]
@@ -371,9 +372,14 @@ def _entries_of_networkx(graph: Any) -> _Told | None:
     if columns == (None, None, None):
         return None
     refuse_networkx(graph)
-    read = ["weight", *(None if k is None else titles[k] for k in columns)]
+    weight, _ = weight_and_sign(titles, "the graph")
+    if weight is not None and columns[0] is not None and is_sign(titles[weight]):
+        weight = None  # an attribute of signs, or of directions
+    read = [None if k is None else titles[k] for k in (weight, *columns)]
     values = lambda title, missing: [missing if title is None else data.get(title, missing) for data in edges]  # noqa: E731
-    told = [values(title, None) for title in read]
+    told = [[*map(known, values(title, None))] for title in read]
+    if columns[0] is None and weight is not None:
+        told[0] = told_weights(told[0], titles[weight])
     beside = [column_of(title, values(title, "")) for title in titles if title not in read]
     if text := signs_beside_intervals(beside, zip(*told[:3], strict=True)):
         raise GraphError(f"the graph: {text}")

@@ -244,8 +244,10 @@ def keywords_as(path: Source, read: Mapping[str, Any]) -> dict[str, Any]:
     """
     asked = options_of_record(read)
     rows, way = _rows(path, Reading(**asked))[0], read["orientation"]
+    if rows.asks:
+        return {"orientation": "listens" if way == "matrix" else way, **asked}
     turned = "information" if rows.matrix else "listens"
-    return {"orientation": way if way == turned or rows.asks else None, **asked}
+    return {"orientation": way if way == turned else None, **asked}
 
 
 def reading_flags(read: Mapping[str, Any]) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ptcc_certify.errors import FormatError, GraphError, NumberError
 from ptcc_certify.graphs.io.columns_beside import directions, is_signed, notes_on_ignored, verdict
-from ptcc_certify.graphs.io.laplacian_or_adjacency import Diagonal, diagonal_of, fits_one_node
+from ptcc_certify.graphs.io.laplacian_or_adjacency import Diagonal, diagonal_of, fits_one_node, is_one_half
 from ptcc_certify.graphs.io.problems import Problem, one_message
 from ptcc_certify.graphs.io.raw_edges import DECIMALS, HEADER_MEND, Rows, Signs
 from ptcc_certify.graphs.io.signs import DIRECTIONS, NO_SIGN, code_among, sign_of_word
@@ -49,7 +49,7 @@ def edges_of(rows: Rows, name: str, how: Reading) -> Edges:
     if name and len(set(rows.labels)) < len(rows.labels):
         label = Counter(rows.labels).most_common(1)[0][0]
         raise FormatError(f'{name}: two nodes have the label "{shorten(label)}"; rename one')
-    refuse_written_twice(rows.labels, name)
+    alike = refuse_written_twice(rows.labels, name)
     if rows.asks and how.orientation is None:
         raise FormatError(f"{name}, {rows.asks}")
     draft = _Draft(rows, name, how)
@@ -76,6 +76,7 @@ def edges_of(rows: Rows, name: str, how: Reading) -> Edges:
     read["notes"] = (
         *draft.notes,
         *rows.notes,
+        *alike,
         *notes,
         *notes_on_ignored(c for c in rows.beside.columns if c.title not in draft.read_too),
     )
@@ -327,22 +328,9 @@ class _Draft:
         first, second = np.asarray(self.rows.first), np.asarray(self.rows.second)
         if not self.how.laplacian and not self.rows.matrix and not fits_one_node(first, second, entries):
             return
-        found = diagonal_of(first, second, entries, len(self.rows.labels), self.how.undirected)
-        if self.how.undirected and not found.laplacian:  # of both halves
-            found = diagonal_of(first, second, entries, len(self.rows.labels), False)
+        found = self.diagonal(first, second, entries)
         if not self.how.laplacian:
-            if self.rows.matrix and found.normalised and not found.laplacian:
-                what = "a positive diagonal, and no positive entry beside it, as of a normalised Laplacian; give W"
-                no = "--no-laplacian" if self.name else "laplacian=False"
-                self.fail(self.name, f"{what}, or add {no} if these are self-loops")
-            if found.laplacian and (self.rows.matrix or found.loops > 1):
-                what = "the diagonal holds the sums of the other entries, as a Laplacian's"
-                if not self.name and not self.rows.matrix:
-                    self.fail(self.name, f"{what}; give the matrix with laplacian=True, or leave the self-loops out")
-                no = "--no-laplacian" if self.name else "laplacian=False"
-                self.fail(
-                    self.name, f"{what}; read it with {self.call('laplacian')}, or add {no} if these are self-loops"
-                )
+            self.refuse_laplacian_untold(found)
             return
         self.refuse_no_laplacian(found)
         self.drop(self.source == self.target)
@@ -350,6 +338,31 @@ class _Draft:
         ordinary = not (found.rows or found.columns)
         self.notes += ("a Laplacian: each weight is minus the entry",)
         self.notes += ("its rows sum to 0, those of the protocol's signed Laplacian do not",) if ordinary else ()
+
+    def diagonal(self, first: np.ndarray, second: np.ndarray, entries: np.ndarray) -> Diagonal:
+        """Compare the diagonal with the other entries; note edges without a direction, where it tells that they are."""
+        both = self.how.undirected or bool(self.undirected)
+        found = diagonal_of(first, second, entries, len(self.rows.labels), both)
+        if found.laplacian or not (both or is_one_half(first, second)):
+            return found
+        other = diagonal_of(first, second, entries, len(self.rows.labels), not both)  # of both halves, or of one
+        if not both and other.laplacian and (other.loops > 1 or self.how.laplacian):
+            self.undirected = "a diagonal that holds the sums over both ends of edges"
+        return other if other.laplacian or not is_one_half(first, second) else found
+
+    def refuse_laplacian_untold(self, found: Diagonal) -> None:
+        """Refuse what looks like a Laplacian and is not told to be one."""
+        no = "--no-laplacian" if self.name else "laplacian=False"
+        if self.rows.matrix and found.normalised and not found.laplacian:
+            what = "a positive diagonal, and no positive entry beside it, as of a normalised Laplacian; give W"
+            self.fail(self.name, f"{what}, or add {no} if these are self-loops")
+        if found.laplacian and (self.rows.matrix or found.loops > 1):
+            what = "the diagonal holds the sums of the other entries, as a Laplacian's"
+            if not (self.name or self.rows.matrix or self.rows.table):
+                self.fail(self.name, f"{what}; give the matrix with laplacian=True, or leave the self-loops out")
+            both = ("undirected",) if self.undirected and not self.how.undirected else ()
+            mend = f"read it with {self.call('laplacian', *both)}, or add {no} if these are self-loops"
+            self.fail(self.name, f"{what}; {mend}")
 
     def refuse_no_laplacian(self, found: Diagonal) -> None:
         """Refuse what is no Laplacian ``D - W``, or tells its direction by columns where none was said."""

@@ -12,7 +12,9 @@ from ptcc_certify.graphs.io.signs import code_among, is_sign, sign_of_word
 from ptcc_certify.graphs.labels import refuse_unnamed
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, shorten
 
-_YES, _NO = ("yes", "true", "1", "x"), ("no", "false", "0", "")
+_YES, _NO = ("yes", "true", "1", "1.0", "x"), ("no", "false", "0", "0.0", "")
+#: Texts that stand where a value is missing; a node may be called so.
+_MISSING = ("na", "n/a", "#n/a", "nan", "null", "none", "<na>", "nat")
 #: Of weights in intervals.
 TWICE = "the edges give intervals themselves; leave out the uncertainty"
 
@@ -28,6 +30,18 @@ def absent(value: Any) -> bool:
     (True, True, False)
     """
     return value is None or (not value.strip() if isinstance(value, str) else str(value) in ("nan", "<NA>", "NaT"))
+
+
+def known(value: Any) -> Any:
+    """Return what is told of an edge beside its ends; None where that is nothing, or a text such as NA.
+
+    Examples
+    --------
+    >>> known("NA"), known(float("nan")), known("0")
+    (None, None, '0')
+    """
+    missing = absent(value) or (isinstance(value, str) and value.strip().lower() in _MISSING)
+    return None if missing else value
 
 
 class Entry(NamedTuple):
@@ -104,7 +118,7 @@ def may_fail(least: Fraction, largest: Fraction) -> tuple[Fraction, Fraction]:
 
 
 def told_weights(weights: Iterable[Any], title: str) -> list[Any]:
-    """Return weights, with 1 and -1 in the place of words for signs where they are nothing else.
+    """Return weights, with 1 and -1 in the place of words for signs where they are nothing else but gaps.
 
     Raises
     ------
@@ -118,10 +132,11 @@ def told_weights(weights: Iterable[Any], title: str) -> list[Any]:
     """
     weights = list(weights)
     words = [sign_of_word(weight) if isinstance(weight, str) else None for weight in weights]
-    if None not in words:
+    gaps = [absent(weight) for weight in weights]
+    if all(word is not None or gap for word, gap in zip(words, gaps, strict=True)):
         return words
     try:
-        numbers = [as_fraction(weight, "weight") for weight in weights]
+        numbers = [as_fraction(weight, "weight") for weight, gap in zip(weights, gaps, strict=True) if not gap]
     except (NumberError, TypeError):
         return weights  # which is told of the edge
     if is_sign(title) and (code := code_among(numbers, title)) is not None:

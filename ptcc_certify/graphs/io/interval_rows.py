@@ -14,7 +14,7 @@ from ptcc_certify.graphs.io.columns_beside import notes_on_ignored, signs_beside
 from ptcc_certify.graphs.io.edge_list import EdgeList, direction_of_comments, notes_on_comments, records
 from ptcc_certify.graphs.io.files import Source, name_and_ending
 from ptcc_certify.graphs.io.graph_files import format_of, graph_bytes, is_edge_list
-from ptcc_certify.graphs.io.interval_edges import Entry, Interval, told_weights
+from ptcc_certify.graphs.io.interval_edges import Entry, Interval, known, told_weights
 from ptcc_certify.graphs.io.problems import Problem, Problems, one_message
 from ptcc_certify.graphs.io.signs import interval_columns, is_sign, plain
 from ptcc_certify.graphs.io.table_columns import BY_HEADER, RATERS, Columns, edge_columns
@@ -134,8 +134,8 @@ def read_interval_rows(path: Source, how: Reading, share: Fraction) -> IntervalR
     edges.read(table.rows)
     if not edges.nodes and not edges.broken.told():
         raise FormatError(f"{table.name}: no edge and no node below the header; give rows")
-    refuse_written_twice([*edges.nodes.texts], table.name)
-    rows = IntervalRows([*edges.nodes.texts], notes=(BY_HEADER,) if table.ends[0] > 0 else ())
+    alike = refuse_written_twice([*edges.nodes.texts], table.name)
+    rows = IntervalRows([*edges.nodes.texts], notes=(*alike, BY_HEADER) if table.ends[0] > 0 else alike)
     rows.notes += (RATERS,) if plain(table.header[table.ends[0]]) == "rater" and how.orientation is None else ()
     beside = [column for _, column in edges.beside]
     try:
@@ -172,16 +172,16 @@ class _Edges(EdgeList):
     def read(self, rows: Iterable[tuple[int, list[str]]]) -> None:
         """Read all rows; the weight of a row stands for both ends of its interval where these are empty."""
         low, high, _ = self.columns_told
-        weight = self.weight
-        if low is None or high is None or weight is None:
-            return super().read(rows)
+        weight, values = self.weight, {self.weight, *self.columns_told}
 
         def with_ends(row: list[str]) -> list[str]:
-            if max(low, high, weight) < len(row) and not (row[low].strip() or row[high].strip()):
-                row = [row[weight] if k in (low, high) else text for k, text in enumerate(row)]
-            return row
+            row = ["" if k in values and known(text) is None else text for k, text in enumerate(row)]
+            if low is None or high is None or weight is None or max(low, high, weight) >= len(row):
+                return row
+            ends = row[low], row[high]
+            return [row[weight] if k in (low, high) and not any(ends) else text for k, text in enumerate(row)]
 
-        return super().read((number, with_ends(row)) for number, row in rows)
+        super().read((number, with_ends(row)) for number, row in rows)
 
     def entries(self, how: Reading) -> list[tuple[str, Entry]]:
         """Return the edges as they are told, each with its line."""

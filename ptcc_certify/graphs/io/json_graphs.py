@@ -6,7 +6,7 @@ import json
 from typing import Any
 
 from ptcc_certify.errors import FormatError
-from ptcc_certify.graphs.io.attributes import attribute_rows, names_or_identifiers, text_of
+from ptcc_certify.graphs.io.attributes import attribute_rows, lower_case, names_or_identifiers, text_of
 from ptcc_certify.graphs.io.files import decoded, one_line_errors
 from ptcc_certify.graphs.io.raw_edges import Rows
 from ptcc_certify.graphs.io.text_matrices import bracketed_matrix
@@ -88,11 +88,22 @@ def _nodes(nodes: list[Any], ends: list[str], name: str) -> tuple[list[str], dic
     elif not all(isinstance(end, _Integer) for end in ends):
         return _named(nodes, ends, name)
     else:
+        _refuse_names(nodes, ends, name)
         identifiers, attributes = [str(k) for k in range(len(nodes))], nodes
     number = {one: k for k, one in enumerate(identifiers)}
     if len(number) < len(nodes):
         raise FormatError(f"{name}: two nodes have the same id; rename one")
     return names_or_identifiers(identifiers, attributes), number
+
+
+def _refuse_names(nodes: list[dict[str, Any]], ends: list[str], name: str) -> None:
+    """Refuse integers at the ends of links that are names of nodes without an id, and positions of others."""
+    for title in _NAMES:
+        names = [lower_case(one).get(title) for one in nodes]
+        integers, called = all(isinstance(one, _Integer) for one in names), {*ends}
+        if integers and called <= {*names} and any(str(k) in called and str(k) != one for k, one in enumerate(names)):
+            what = f"links call nodes by integers that are positions, or {title}s?"
+            raise FormatError(f"{name}: {what} Give each node its own id, and name the ends of links by these")
 
 
 def _named(nodes: list[dict[str, Any]], ends: list[str], name: str) -> tuple[list[str], dict[str, int]]:

@@ -63,6 +63,21 @@ def fits_one_node(first: np.ndarray, second: np.ndarray, entries: np.ndarray) ->
     return any(abs(total - abs(diagonal)) <= _ROUNDED * np.abs(both).sum() for total in sums)
 
 
+def is_one_half(first: np.ndarray, second: np.ndarray) -> bool:
+    """Tell whether no pair of nodes stands both ways, as in a triangle of a symmetric matrix.
+
+    Examples
+    --------
+    >>> is_one_half(np.array([0, 0]), np.array([0, 1])), is_one_half(np.array([0, 1]), np.array([1, 0]))
+    (True, False)
+    """
+    off = first != second
+    first, second = first[off].astype(np.int64), second[off].astype(np.int64)
+    n = 1 + max(first.max(initial=0), second.max(initial=0))
+    unordered = np.minimum(first, second) * n + np.maximum(first, second)
+    return np.unique(unordered).size == np.unique(first * n + second).size
+
+
 def diagonal_of(first: np.ndarray, second: np.ndarray, entries: np.ndarray, n: int, both: bool) -> Diagonal:
     """Compare the diagonal of an n x n matrix with its other entries; ``both`` if (k, l) stands for (l, k), too.
 

@@ -57,6 +57,7 @@ class Rows:
     in_order: bool = True  # do the rows come as they stand in the file?
     headerless: bool = False
     matrix: bool = False  # entries of a matrix, whose rows listen unless it is said that they inform
+    table: bool = False  # a DataFrame, of which all that is told of files may be said
     notes: tuple[str, ...] = ()
     problems: Sequence[Problem] = ()  # what is wrong with rows that are left out
     asks: str = ""  # why the direction must be told

@@ -30,7 +30,7 @@ def read_sif(data: bytes, name: str, how: Reading) -> Rows:
         if not all(fields) or len(fields) == 2:
             mend = "write a relation b: one source, one relation, then its targets"
             raise FormatError(f'{name}, line {number}: "{shorten(line.strip())}" is no row of SIF; {mend}')
-        if (score := next(filter(is_number, fields[3:]), "")) and not any(map(is_number, (fields[0], fields[2]))):
+        if score := _score(fields):
             mend = "leave scores out, or write a table with a header source,target,sign,weight as .csv"
             raise FormatError(f"{name}, line {number}: {shorten(score)} is a score, not a target; {mend}")
         source = draft.nodes[fields[0]]
@@ -39,6 +39,19 @@ def read_sif(data: bytes, name: str, how: Reading) -> Rows:
     rows = draft.rows()
     rows.beside.title, rows.beside.may_be_told = "relation", False
     return rows
+
+
+def _score(fields: list[str]) -> str:
+    """Return a number after the first target that is none, since nodes have names or other numbers; "" without one.
+
+    Examples
+    --------
+    >>> _score(["1956", "activates", "2885", "0.93"]), _score(["1956", "activates", "2885", "207"])
+    ('0.93', '')
+    """
+    ends = [fields[0], *fields[2:3]]
+    named, whole = not any(map(is_number, ends)), all(end.isdigit() or not is_number(end) for end in ends)
+    return next((one for one in fields[3:] if is_number(one) and (named or (whole and not one.isdigit()))), "")
 
 
 def _is_edge(line: str, fields: list[str]) -> bool:

@@ -29,6 +29,8 @@ SIGN = (
     *("sign", "type", "edgetype", "effect", "relation", "relationship", "interaction", "interactiontype"),
     *("regulation", "polarity", "valence", "attitude", "mor"),
 )
+#: Titles of signs that may hold sizes, too.
+_SIZES = ("effect", "mor")
 #: Titles of the least and the largest weight of an edge, and of whether it may fail, which make a family of a graph.
 _LEAST = ("weight_min", "min_weight", "w_min", "least", "min", "lower")
 _LARGEST = ("weight_max", "max_weight", "w_max", "largest", "max", "upper")
@@ -106,17 +108,22 @@ def weight_and_sign(titles: Sequence[str], place: str) -> tuple[int | None, int 
 def code_among(values: Sequence[Fraction], title: str) -> Fraction | None:
     """Return a number that makes a column of relations one of codes; None where it holds signs, 1 and -1.
 
-    A column called sign may hold 1 alone, or any number beside a negative one; fractions are no codes.
+    A column called sign may hold 1 alone, or any number beside a negative one; fractions are no codes beside a
+    negative number, or where the title is one of sizes, too.
 
     Examples
     --------
     >>> code_among([Fraction(1), Fraction(2)], "type"), code_among([Fraction(1), Fraction(-1)], "type")
     (Fraction(2, 1), None)
+    >>> code_among([Fraction("1.1")], "type"), code_among([Fraction("1.1")], "effect")
+    (Fraction(11, 10), None)
     """
     numbers = set(values)
     if title.strip().lower() == "sign":
         return None if min(numbers, default=0) < 0 else next((v for v in values if v != 1), None)
-    if not numbers or (-1 in numbers and numbers <= {-1, 0, 1}) or any(v.denominator > 1 for v in numbers):
+    if not numbers or (-1 in numbers and numbers <= {-1, 0, 1}):
+        return None
+    if any(v.denominator > 1 for v in numbers) and (min(numbers) < 0 or plain(title) in _SIZES):
         return None
     return next((v for v in values if v not in (-1, 1)), values[0])
 

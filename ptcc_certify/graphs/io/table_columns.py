@@ -261,11 +261,14 @@ def asks_of_corner(corner: str, line: str) -> str:
 
     Examples
     --------
-    >>> asks_of_corner("target", "line 1"), asks_of_corner(r"from\to", "line 1").partition(";")[0]
+    >>> asks_of_corner("to from", "line 1"), asks_of_corner(r"from\to", "line 1").partition(";")[0]
     ('', 'line 1: the corner from\\to says that rows are heard')
     """
-    words = "|".join((*_STARTS, rf"({_HEARD}){_REST}"))
-    if not re.fullmatch(words, plain(re.split(r"[\\/|:>,]", corner.strip())[0])):
+    heard, ends = "|".join((*_STARTS, rf"({_HEARD}){_REST}")), "|".join(_ENDS)
+    words = re.findall(r"[^\W_]+", corner.lower())
+    words = words[1:] if words[:1] in (["row"], ["rows"]) else words
+    begins = ["".join(words[:k]) for k in range(1, len(words) + 1)]
+    if not any(re.fullmatch(rf"({heard})({ends})?", begin) for begin in begins):
         return ""
     mend = "say --edges information if they are, or --edges listens if rows listen to columns"
     return f"{line}: the corner {shorten(corner)} says that rows are heard; {mend}"
