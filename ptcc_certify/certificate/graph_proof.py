@@ -136,6 +136,12 @@ class GraphProof(Proof):
         """Whether every agent keeps its state, so that there is no decay to certify."""
         return self.graph.n_edges == 0
 
+    @property
+    def at_rest(self) -> bool:
+        """Whether every agent begins at its final state, exactly, and nothing slides."""
+        end = self.final_positions
+        return self.direct and end is not None and end.exact and tuple(self.initial_positions or ()) == end.states
+
     # ------------------------------------------------------------------ rates
 
     @cached_property

@@ -72,13 +72,12 @@ def judge_behaviour(structure: Structure, expected: str) -> Answer:
 def _judge_behaviour(proof: GraphProof, expected: str) -> Answer:
     """Tell the same of what the agents are, which may be of order n, and have places or a capped gain."""
     answer, part = judge_behaviour(proof.structure, expected), proof.agents
-    if part is None and proof.offsets is not None:
-        what = f"{expected} of x - offsets"
-        if proof.limits:
-            return Answer(OPEN, what, "limits of the gain leave something at T")
-        return replace(answer, what=what)
     if part is None:
-        return answer
+        answer = replace(answer, what=expected if proof.offsets is None else f"{expected} of x - offsets")
+        if proof.constant or (proof.at_rest and proof.noise is None) or not (proof.limits or proof.noise):
+            return answer
+        what = "limits of the gain leave" if proof.limits else "noise leaves"
+        return replace(answer, status=OPEN, why=f"{what} something at T")
     what = f"{expected} of x - offsets" if part.formation else expected
     if part.settles:
         return replace(answer, what=what)
@@ -185,7 +184,7 @@ def judge_limits(proof: GraphProof) -> list[Answer]:
         elif proof.limits:
             why = no_bound
         answers.append(Answer(OPEN, "noise", why))
-    if proof.delta is not None and (effort is None or effort.disturbed is None):
+    if proof.delta is not None and not proof.constant and (effort is None or effort.disturbed is None):
         bounded = effort is not None and effort.bounded
         answers.append(Answer(OPEN, "delta", no_bound if bounded else "the rate proves no bounded input"))
     return answers
@@ -197,10 +196,9 @@ def judge_limits(proof: GraphProof) -> list[Answer]:
 def at_deadline(proof: GraphProof | FamilyProof, answer: Answer) -> Answer:
     """Return what becomes at ``T``, where messages are late, of a behaviour that follows where none are."""
     late = proof.late
-    asked = proof.asked_messages is not None
-    if not asked or answer.status != MET or proof.constant:
+    if proof.asked_messages is None or answer.status != MET or proof.constant:
         return answer
-    what = f"{answer.what} at T with late messages"
+    what = f"{answer.what} at T with {proof.asked_messages.name}"
     if late is None:
         return Answer(OPEN, what, "nothing is proved of them")
     if late.direct or (late.vehicles is not None and not late.largest):
@@ -232,20 +230,19 @@ def judge_rate_beside(proof: GraphProof | FamilyProof, least: Fraction, what: st
         return None
     if late is None or late.lmi is None:
         vehicles = proof.velocities is not None and proof.asked_messages.exact
-        whose = "of vehicles that exchange virtual positions" if vehicles else "with late messages"
+        whose = "of vehicles that exchange virtual positions" if vehicles else f"with {proof.asked_messages.name}"
         return Answer(OPEN, what, f"no rate is proved {whose}")
     rate = 2 * late.lmi.b
-    return Answer(MET if rate >= least else OPEN, what, f"with late messages {down(rate)} is proved")
+    return Answer(MET if rate >= least else OPEN, what, f"with {late.messages.name} {down(rate)} is proved")
 
 
 def judge_messages(proof: GraphProof | FamilyProof) -> list[Answer]:
     """Tell what becomes of what may be left at ``T`` with late messages, and whether anything is proved of these."""
     late, most = proof.late, proof.expectations.max_residual
     if late is None:
-        unproved = proof.asked_messages is not None
         answers = []
-        if unproved:
-            answers.append(Answer(OPEN, "late messages", "nothing is proved of what is left at T"))
+        if proof.asked_messages is not None:
+            answers.append(Answer(OPEN, proof.asked_messages.name, "nothing is proved of what is left at T"))
         elif most is not None:
             answers.append(Answer(OPEN, "max_residual", "no messages are late"))
         if proof.asked_leaders is not None and proof.tracking is None:
@@ -256,7 +253,7 @@ def judge_messages(proof: GraphProof | FamilyProof) -> list[Answer]:
         limit = f"; this certificate's limit is a delay of {late.longest_delay:.3g}" if limited else ""
         wish = "" if most is None else _longest(late, f"within {near(most, 12)} at T is ")
         mend = "; give an initial state" if proof.initial_state is None else ""
-        return [Answer(OPEN, "late messages", f"nothing is proved of what is left at T{mend}{limit}{wish}")]
+        return [Answer(OPEN, late.messages.name, f"nothing is proved of what is left at T{mend}{limit}{wish}")]
     return [] if most is None else [_judge_residual(proof, late, most)]
 
 

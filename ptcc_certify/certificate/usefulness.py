@@ -177,7 +177,8 @@ def _limited_usefulness(proof: GraphProof) -> tuple[bool, str]:
         if worst <= Fraction(USEFUL) * Fraction(way):
             return True, f"under the limits every agent within {up(worst, 2)} of its final state at T"
     norm = max(entry.norm if entry.noisy_norm is None else entry.noisy_norm for entry in residual)
-    remark = f"under the limits ||E|| <= {up(norm, 2)} at T"
+    under = f"under the limits{' and noise' if noisy else ''} ||E||"
+    remark = f"{under} <= {up(norm, 2)} at T"
     rows = proof.structure.graph.exact_rows(range(proof.structure.graph.n_nodes))
     if region is not None:  # the largest |e_k(0)| of the set is attained, the norm that goes with it is larger
         largest = max(region.largest(row) for row in rows)
@@ -186,7 +187,7 @@ def _limited_usefulness(proof: GraphProof) -> tuple[bool, str]:
     if not first:
         return norm == 0, remark
     share = root_above(norm**2 / first)
-    return share <= USEFUL, f"under the limits ||E|| <= {up(share, 2)} ||E(0)|| at T"
+    return share <= USEFUL, f"{under} <= {up(share, 2)} ||E(0)|| at T"
 
 
 def _advise(proof: GraphProof, rho2: Fraction | None) -> tuple[str, Sentence]:

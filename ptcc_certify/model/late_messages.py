@@ -170,6 +170,16 @@ lambda of L, or measure the own state without delay
         """Whether nothing is late, lost or rounded."""
         return not self.age and not self.value_error
 
+    @property
+    def flaws(self) -> tuple[str, ...]:
+        """What messages are, of "late" and "rounded"; empty where they are exact."""
+        return tuple(word for word, size in (("late", self.age), ("rounded", self.value_error)) if size)
+
+    @property
+    def name(self) -> str:
+        """What they are called: late messages, rounded ones, or both."""
+        return f"{' and '.join(self.flaws) or 'late'} messages"
+
     def latencies(self, of: SignedDigraph | Family) -> Fraction | tuple[Fraction, ...]:
         """Return what messages take: one number, or one for every ordered pair of an edge, in the order of these.
 

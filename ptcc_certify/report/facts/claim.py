@@ -16,6 +16,7 @@ from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.structure import BIPARTITE_CONTAINMENT, STABILITY, Structure
 from ptcc_certify.report.facts.agents import claimed_of
 from ptcc_certify.report.facts.constrained_switching import RESTS, of_mode
+from ptcc_certify.report.facts.input import without
 from ptcc_certify.report.facts.interval_words import interval_text
 from ptcc_certify.report.text_layout import (
     TEXT,
@@ -52,30 +53,31 @@ def asked_messages(certificate: Certificate) -> LateMessages | None:
     return None if certificate.proof.late is None else certificate.proof.late.messages
 
 
+def without_flaws(messages: LateMessages | None) -> str:
+    """Tell that nothing is late, or rounded, of what was asked."""
+    return f"nothing {' or '.join(messages.flaws if messages is not None else ())}"
+
+
 def assumptions(certificate: Certificate) -> list[str]:
     """Tell what claim, final state, rate and error are without, where more was asked."""
     messages, leaders, limits = asked_messages(certificate), certificate.proof.asked_leaders, bool(certificate.limits)
     virtual = messages is not None and messages.vehicles is not None
-    asked = {"limits": limits, "noise": certificate.noise is not None}
-    asked["disturbances"] = certificate.delta is not None and certificate.protocol.reaching is None
-    lacking = [name for name, holds in asked.items() if holds]
     assumed = {
         "of virtual positions": virtual,
         "without a gain cap": not limits and messages is not None and messages.gain_cap is not None,
-        "nothing late": messages is not None and not (virtual and messages.exact),
+        without_flaws(messages): messages is not None and not messages.exact,
         "leaders at rest": certificate.proof.leaders_move,
         "without disturbances": leaders is not None and leaders.disturbance > 0,
         "without sign(e_k)": leaders is not None and leaders.sign_gain is not None,
     }
-    first = " or ".join(filter(None, (", ".join(lacking[:-1]), *lacking[-1:])))
-    return [f"without {first}"] * bool(lacking) + [text for text, holds in assumed.items() if holds]
+    return [*without(certificate), *(text for text, holds in assumed.items() if holds)]
 
 
 def claim_facts(certificate: Certificate) -> Facts:
     """Tell what the agents of one graph do, by when, and under what."""
     p = certificate.protocol
     assumed = assumptions(certificate)
-    also = "".join(f", {text}" for text in (["without limits"] if certificate.limits else assumed))
+    also = "".join(f", {text}" for text in assumed)
     if p.reaching is not None and not also:
         also = f", any |d_k| <= {down(p.reaching.delta, 12)}" if p.reaching.delta else ", without disturbances"
     when = f" at T = {near(p.T)}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from fractions import Fraction
 from functools import partial
 from typing import TYPE_CHECKING
@@ -18,13 +18,14 @@ from ptcc_certify.errors import Change, Sentence, joined, labelled
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
 from ptcc_certify.report.facts.constrained_switching import TINY, TOO_SMALL, every_text
-from ptcc_certify.report.facts.input import limits_text, without_limits
+from ptcc_certify.report.facts.input import limits_text, said_without
 from ptcc_certify.report.facts.reported_times import SHORT, told_instants
 from ptcc_certify.report.text_layout import shorten_list
 from ptcc_certify.theorems.counterexample_text import mode_name
 from ptcc_certify.theorems.explicit_family_rate import explicit_rate
 
 if TYPE_CHECKING:
+    from ptcc_certify.bounds.input.effort import Limited
     from ptcc_certify.certificate.certificate import Certificate
 
 #: What proves an upper bound on the rate, in words.
@@ -89,40 +90,48 @@ def error_facts(certificate: Certificate, drawn: bool, details: bool) -> Facts:
     proof = certificate.graph_proof
     if proof.constant:
         invariant = "its state" if certificate.direct else "x - sigma"
-        yield Fact(head="error", note=f"none: no agent listens to another, each keeps {invariant}")
+        note = f"none: no agent listens to another, each keeps {invariant}"
+        yield from said_without(certificate, [Fact(head="error", note=note)])
         return
-    end = proof.final_positions
-    if certificate.direct and end is not None and end.exact and tuple(proof.initial_positions or ()) == end.states:
-        yield Fact(head="error", note="none: every agent begins at its final state")
+    residual = () if proof.effort is None else proof.effort.residual
+    if proof.at_rest and not any(entry.noise for entry in residual):
+        yield from said_without(certificate, [Fact(head="error", note="none: every agent begins at its final state")])
         return
-    value, norm, agents, more = _error_texts(certificate)
-    if norm:
-        limited = proof.effort is not None and bool(proof.effort.residual)  # from the whole set
-        texts = [norm + agents.replace("every agent", whom) + more for whom in ("every agent", "agents", "each")]
-        brief = [*(texts if limited or not drawn else []), norm + more]
-        standing: Standing = "proved" if limited or certificate.direct else "unproved"
-        yield Fact(head="error", value=value, side="up", standing=standing, note=brief[0], brief=tuple(brief))
+    if residual:
+        yield _error_fact("proved", _limited_error(residual))
+    if not residual or certificate.at is not None:
+        standing: Standing = "proved" if certificate.direct else "unproved"
+        told = [_error_fact(standing, text, drawn) for text in _ideal_error(certificate)]
+        yield from said_without(certificate, told)
     if details and proof.rate is not None:
-        yield from without_limits(certificate, instants_facts(certificate))
+        yield from said_without(certificate, instants_facts(certificate))
         if certificate.initial_state is not None and not drawn and any(V.deviation for V in proof.functions):
-            yield from without_limits(certificate, _deviation_facts(certificate))
+            yield from said_without(certificate, _deviation_facts(certificate))
 
 
-def _error_texts(certificate: Certificate) -> tuple[Fraction | float, str, str, str]:
-    """Return bounds of the error and of every agent's deviation at 0.99 T, at the instant asked for, or under limits.
+def _error_fact(standing: Standing, told: tuple[Fraction | float, str, str, str], drawn: bool = False) -> Fact:
+    """Tell a bound of the error, and of every agent unless the initial state is of no interest: value and texts."""
+    value, norm, agents, more = told
+    texts = [norm + agents.replace("every agent", whom) + more for whom in ("every agent", "agents", "each")]
+    brief = [*([] if drawn else texts), norm + more]
+    return Fact(head="error", value=value, side="up", standing=standing, note=brief[0], brief=tuple(brief))
 
-    The first number, and texts that are empty where nothing is proved; the last one tells that there are more limits.
-    """
+
+def _limited_error(residual: Sequence[Limited]) -> tuple[Fraction | float, str, str, str]:
+    """Return bounds of the error and of every agent's deviation at ``T`` under the first limits, and how many are."""
+    entry, *others = residual
+    noise = "" if entry.noise is None else f", |n_k| <= {down(entry.noise, 12)}"
+    size = entry.noisy_norm or entry.norm
+    norm = f"{limits_text(entry.limits)}{noise}: ||E|| <= {up(size, 2)} at T"
+    agents = "" if entry.agents is None or entry.noisy_norm else f", every agent within {up(max(entry.agents), 2)}"
+    return size, norm, agents, f"; ... {len(others) + 1} limits in all" if others else ""
+
+
+def _ideal_error(certificate: Certificate) -> Iterator[tuple[Fraction | float, str, str, str]]:
+    """Yield bounds of the error and of every agent's deviation at 0.99 T, or at the instant asked for, if proved."""
     proof = certificate.graph_proof
-    if proof.effort is not None and proof.effort.residual:
-        entry, *others = proof.effort.residual
-        noise = "" if entry.noise is None else f", |n_k| <= {down(entry.noise, 12)}"
-        size = entry.noisy_norm or entry.norm
-        norm = f"{limits_text(entry.limits)}{noise}: ||E|| <= {up(size, 2)} at T"
-        agents = "" if entry.agents is None or entry.noisy_norm else f", every agent within {up(max(entry.agents), 2)}"
-        return size, norm, agents, f"; ... {len(others) + 1} limits in all" if others else ""
     if proof.rate is None or (not certificate.direct and certificate.initial_state is None):
-        return 0, "", "", ""
+        return
     remaining, when = told_instants(certificate.protocol, certificate.direct)[SHORT]
     if certificate.at is not None:
         remaining, when = float(1 - certificate.at / certificate.protocol.T), f"t = {near(certificate.at)}"
@@ -137,7 +146,7 @@ def _error_texts(certificate: Certificate) -> tuple[Fraction | float, str, str, 
     if certificate.initial_state is not None and any(V.deviation for V in proof.functions):
         agents = f", every agent within {up(float(proof.deviation_bound([remaining]).max()), 2)}"
     when += "" if certificate.direct else ", numerical"
-    return value, f"at {when}: {norm}", agents, ""
+    yield value, f"at {when}: {norm}", agents, ""
 
 
 def _at_instants(values: Iterable[float], names: Iterable[str]) -> str:

@@ -21,10 +21,20 @@ if TYPE_CHECKING:
     from ptcc_certify.checker.input_formulas import InitialSet, Limits
 
 
-def without_limits(certificate: Certificate, facts: Iterable[Fact]) -> Facts:
-    """Say of facts of the law without limits that they are of it, where limits were asked for."""
+def without(certificate: Certificate) -> list[str]:
+    """Tell that something is without limits, noise and disturbances, of what was asked; nothing if none was."""
+    asked = {"limits": bool(certificate.limits), "noise": certificate.noise is not None}
+    asked["disturbances"] = certificate.delta is not None and certificate.protocol.reaching is None
+    lacking = [name for name, holds in asked.items() if holds]
+    return [f"without {' or '.join(filter(None, (', '.join(lacking[:-1]), *lacking[-1:])))}"] if lacking else []
+
+
+def said_without(certificate: Certificate, facts: Iterable[Fact]) -> Facts:
+    """Say of facts that are without limits, noise and disturbances that they are, where these were asked for."""
+    first = "".join(f"{text}: " for text in without(certificate))
     for fact in facts:
-        yield replace(fact, note=joined("", ("without limits: ", fact.note))) if certificate.limits else fact
+        brief = tuple(joined("", (first, text)) for text in fact.brief)
+        yield replace(fact, note=joined("", (first, fact.note)), brief=brief) if first else fact
 
 
 def input_facts(certificate: Certificate, details: bool) -> Facts:
@@ -32,17 +42,20 @@ def input_facts(certificate: Certificate, details: bool) -> Facts:
     effort = certificate.graph_proof.effort
     if effort is None or certificate.proof.constant:
         return
-    yield _input_fact(certificate, effort)
+    told = [_input_fact(certificate, effort)]
+    yield from told if effort.residual else said_without(certificate, told)
     if not details:
         return
-    yield from without_limits(certificate, chain(threshold_facts(certificate), _size_facts(certificate, effort)))
+    yield from said_without(certificate, chain(threshold_facts(certificate), _size_facts(certificate, effort)))
     yield from _limited_facts(effort)
 
 
 def _input_fact(certificate: Certificate, effort: Effort) -> Fact:
     entry = effort.residual[0] if effort.residual else None
     if entry is not None:
-        text, largest = "bounded under these limits", entry.largest if entry.noise is None else entry.noisy_largest
+        text, largest = "bounded under these limits", entry.largest
+        if entry.noise is not None:
+            text, largest = f"{text}, |n_k| <= {down(entry.noise, 12)}", entry.noisy_largest
         nothing = "; under a sample period no number is proved"
     else:
         states = {True: "bounded", False: "NOT BOUNDED from some initial states", None: "not proved bounded"}

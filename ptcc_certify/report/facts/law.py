@@ -24,6 +24,9 @@ def beside_law(certificate: Certificate) -> list[str]:
             told.append(
                 f"Here nothing is late; with late messages what is heard, {whose}, is up to {near(messages.age)} old."
             )
+        if messages.value_error > 0:
+            off = f"with rounded ones what is heard is off by up to {near(messages.value_error)}"
+            told.append(f"Here messages are exact; {off}.")
         if messages.gain_cap is not None and messages.vehicles is None and not limits:
             limits = [Limits(gain_cap=messages.gain_cap)]
     if leaders is not None:

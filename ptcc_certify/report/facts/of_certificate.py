@@ -99,7 +99,8 @@ def _of_graph(certificate: Certificate, details: bool, beside: bool) -> Facts:
     elif not drawn:
         yield from _details(final_facts(certificate), certificate.proof.leaders_move)
     if details:
-        of = "" if certificate.proof.agents is None else "of single integrators: "
+        part = certificate.proof.agents
+        of = "" if part is None else "of the plain protocol: " if part.order == 1 else "of single integrators: "
         yield from (replace(fact, note=joined("", (of, fact.note))) for fact in rate_facts(certificate))
     if certificate.proof.agents is None and (details or not beside):
         yield from _details(error_facts(certificate, drawn, details), beside)

@@ -15,6 +15,7 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.graphs.recognised_files import kind_of
 from ptcc_certify.graphs.structure import Structure, analyse
+from ptcc_certify.report.facts.claim import without_flaws
 from ptcc_certify.simulation.trajectory import Trajectory
 
 #: What limits a gain, in the order of the parameters of ``GainLimits``.
@@ -158,7 +159,7 @@ def ideal_text(certificate: Certificate) -> str:
     absent = {
         "virtual positions": virtual,
         "no limits": certificate.limits or (late is not None and late.messages.gain_cap is not None),
-        "nothing late": late is not None and not (virtual and late.messages.exact),
+        without_flaws(None if late is None else late.messages): late is not None and not late.messages.exact,
         "leaders at rest": moving,
     }
     return ", ".join(text for text, there in absent.items() if there)
@@ -179,11 +180,12 @@ def limits_text(run: Trajectory, certificate: Certificate | None) -> str:
         words = dict(zip(("leaders move at up to", "disturbed by up to", "with sign(e) times"), values, strict=True))
         named += [f"{name} {near(number)}" for name, number in words.items() if number]
     if certificate is not None:
-        vehicles = run.vehicles
+        vehicles, late = run.vehicles, certificate.proof.late
+        flawed = "late messages" if late is None else late.messages.name
         forced = certificate.sigma0 is None and met.forcing is None and leaders is None
         absent = {
             "without the limits of the gain": limits is None and certificate.limits,
-            "without late messages": messages is None and certificate.proof.late and not vehicles,
+            f"without {flawed}": messages is None and certificate.proof.late and not vehicles,
             "leaders at rest": leaders is None and certificate.proof.leaders_move,
             "without disturbance": forced and certificate.delta,
             "without noise": forced and certificate.noise,
