@@ -9,6 +9,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from asked import certify_words
 from selection import thinned
 
 import ptcc_certify as ptcc
@@ -16,6 +17,7 @@ from lmi.exact.decimal_rounding import down, up
 from ptcc_certify.cli.terminal import flagged
 from ptcc_certify.errors import Change, ParameterError, spell
 from ptcc_certify.report.facts.late import _within_text
+from ptcc_certify.report.facts.law import beside_law
 from ptcc_certify.report.page import set_note
 from ptcc_certify.report.screen import certificate_lines, summary_lines
 
@@ -129,3 +131,61 @@ def test_agents_of_order_n_are_not_single_integrators_and_end_at_their_places(tm
         certificate.save(tmp_path / f"{name}.json")
         ptcc.write_report(tmp_path / f"{name}.json", tmp_path / f"{name}.html")
         assert says in (tmp_path / f"{name}.html").read_text("utf-8")
+
+
+CAMPS = [("a", "b", 1), ("b", "a", 2), ("b", "c", -1), ("c", "b", -1)]
+
+
+def asked(x0: Any = (1, 2, 3), **words: Any) -> ptcc.Certificate:
+    return certify_words(CAMPS, ptcc.NominalProtocol(), list(x0), simulation=False, **words)
+
+
+def test_bounds_of_the_law_without_what_was_asked_say_so_on_every_screen():
+    slow = asked(limits=ptcc.GainLimits(sample_period="0.2"))
+    noisy = asked(noise="0.1", delta="0.1")
+    for certificate, without in ((slow, "limits"), (noisy, "noise or disturbances")):
+        for head in ("error", "input"):
+            assert told(certificate, head)[0].startswith(f"without {without}: ")
+            assert any(line.startswith(f"{head:<10} without {without}: ") for line in summary_lines(certificate))
+    both = asked(limits=ptcc.GainLimits(gain_cap=20), noise="0.01", at="0.7")
+    assert told(both, "input")[0].startswith("bounded under these limits, |n_k| <= 0.01; ")
+    assert "under the limits and noise" in told(both, "verdict")[0]
+    assert told(both, "claim")[0].startswith("bipartite consensus at T = 1, without limits or noise ")
+    assert any("without limits or noise: at t = 0.7: " in line for line in summary_lines(both))
+
+
+def test_agents_that_begin_at_their_ends_stay_there_but_for_noise():
+    cap, ends = ptcc.GainLimits(gain_cap=20), ["0.3", "0.3", "-0.3"]
+    assert told(asked(ends, limits=cap), "error")[0] == "without limits: none: every agent begins at its final state"
+    assert told(asked(ends, limits=cap, noise="0.01"), "error")[0].startswith("gain <= 20, |n_k| <= 0.01: ||E|| <= 0.1")
+
+
+@pytest.mark.parametrize(
+    "words, left",
+    [
+        ({"limits": ptcc.GainLimits(gain_cap="0.5")}, "limits of the gain leave something at T"),
+        ({"noise": "0.1"}, "noise leaves something at T"),
+    ],
+)
+def test_a_behaviour_is_not_met_where_limits_or_noise_leave_something(words: dict[str, Any], left: str):
+    certificate = asked(expectations=ptcc.Expectations("bipartite consensus"), **words)
+    assert f"left open: bipartite consensus ({left})" in told(certificate, "verdict")[0]
+    assert certificate.assessment.exit_code == 4
+    still = asked(
+        ["0.3", "0.3", "-0.3"], expectations=ptcc.Expectations("bipartite consensus"), limits=words.get("limits")
+    )
+    assert told(still, "verdict")[0].startswith("met: ")
+
+
+def test_messages_that_are_rounded_are_not_called_late():
+    rounded = asked(messages=ptcc.LateMessages(value_error="0.1"))
+    both = asked(messages=ptcc.LateMessages("0.001", value_error="0.1"))
+    assert (
+        ", nothing rounded (" in told(rounded, "claim")[0] and ", nothing late or rounded (" in told(both, "claim")[0]
+    )
+    assert beside_law(rounded) == ["Here messages are exact; with rounded ones what is heard is off by up to 0.1."]
+
+
+def test_rates_of_the_plain_protocol_are_not_those_of_agents_of_order_1_with_gains_of_their_own():
+    certificate = asked(agents=ptcc.Agents(order=1, decay=2))
+    assert told(certificate, "rate")[0].startswith("of the plain protocol: 2.763")

@@ -575,7 +575,9 @@ def test_the_run_that_is_drawn_is_the_one_that_was_asked(title: str) -> None:
     ends = [line.get_ydata()[-1] for line in agent_lines(states)]  # type: ignore[index]
     assert sorted(ends) == pytest.approx(sorted(run.states[:, -1]), abs=1e-6)
     bounds = [line.get_label() for line in drawn_axes[1].lines if "bound" in str(line.get_label())]
-    assert all(str(label).endswith(("nothing late", "leaders at rest", "no limits")) for label in bounds)
+    assert all(
+        str(label).endswith(("nothing late", "nothing rounded", "leaders at rest", "no limits")) for label in bounds
+    )
 
 
 def test_where_delays_are_too_short_for_a_run_the_states_say_that_they_are_without() -> None:

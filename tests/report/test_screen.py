@@ -56,7 +56,7 @@ def assert_short(lines: list[str], most: int) -> None:
 def assert_screen(certificate: ptcc.Certificate, name: str = "graph") -> list[str]:
     """The screen is short, and its verdict is that of the exit code."""
     lines = summary_lines(certificate, name)
-    assert_short(lines, 11 if len(certificate.claims) == 1 else 14)
+    assert_short(lines, 12 if len(certificate.claims) == 1 else 14)
     (verdict,) = [line for line in lines if line.startswith("verdict ")]
     assert re.match(rf"verdict    {VERDICTS[certificate.assessment.exit_code]}\b", verdict), verdict
     return lines
