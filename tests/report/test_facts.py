@@ -171,18 +171,23 @@ def test_a_behaviour_is_not_met_where_limits_or_noise_leave_something(words: dic
     certificate = asked(expectations=ptcc.Expectations("bipartite consensus"), **words)
     assert f"left open: bipartite consensus ({left})" in told(certificate, "verdict")[0]
     assert certificate.assessment.exit_code == 4
-    still = asked(
-        ["0.3", "0.3", "-0.3"], expectations=ptcc.Expectations("bipartite consensus"), limits=words.get("limits")
-    )
+    still = asked(["0.3", "0.3", "-0.3"], expectations=certificate.expectations, limits=words.get("limits"))
     assert told(still, "verdict")[0].startswith("met: ")
 
 
 def test_messages_that_are_rounded_are_not_called_late():
-    rounded = asked(messages=ptcc.LateMessages(value_error="0.1"))
-    both = asked(messages=ptcc.LateMessages("0.001", value_error="0.1"))
-    assert (
-        ", nothing rounded (" in told(rounded, "claim")[0] and ", nothing late or rounded (" in told(both, "claim")[0]
+    led, law, asks = (
+        [("lead", "a", 1), ("a", "b", 1), ("b", "a", -1)],
+        ptcc.NominalProtocol(),
+        ptcc.Asks(simulation=False),
     )
+    messages = {
+        "nothing late or rounded": ptcc.LateMessages("0.001", value_error="0.1"),
+        "nothing rounded": ptcc.LateMessages(value_error="0.1"),
+    }
+    for without, of in messages.items():
+        rounded = ptcc.certify(led, law, [1, 2, 3], messages=of, asks=asks)
+        assert f", {without} (" in told(rounded, "claim")[0]
     assert beside_law(rounded) == ["Here messages are exact; with rounded ones what is heard is off by up to 0.1."]
 
 
