@@ -610,7 +610,7 @@ def test_page_and_statement_tell_of_late_messages_and_moving_leaders() -> None:
     page, statement = Path("c.html").read_text(), Path("c.tex").read_text()
     assert "consensus at T = 1, nothing late</h1>" in page
     assert "nothing late, in what follows" in page
-    assert r"Late messages: up to $0.1$ old." in statement
+    assert r"Messages: up to $0.1$ old." in statement
     assert r"agent c is off its final state at $T$ by $4.06 \cdot 10^{-5}$ at least, if none comes sooner." in statement
     assert "leaders at rest, in what follows" in Path("l.html").read_text()
     assert "every follower on its target at $T = 1$" in Path("l.tex").read_text()
@@ -695,7 +695,7 @@ def test_a_file_without_anything_proved_of_late_messages_still_says_that_they_we
     assert "LATE" in run.out and "LATE" in saved.summary()
     assert said in run.out and said in saved.summary()
     assert ptcc("report", "c.json", "-o", "c.html").code == ptcc("report", "c.json", "-o", "c.tex").code == 0
-    assert "Late messages" in Path("c.html").read_text() and "nothing is proved" in Path("c.html").read_text()
+    assert "Messages" in Path("c.html").read_text() and "nothing is proved" in Path("c.html").read_text()
 
 
 def test_a_file_without_anything_proved_of_moving_leaders_still_says_that_they_were_asked_for() -> None:
