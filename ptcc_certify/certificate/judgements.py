@@ -74,7 +74,8 @@ def _judge_behaviour(proof: GraphProof, expected: str) -> Answer:
     answer, part = judge_behaviour(proof.structure, expected), proof.agents
     if part is None:
         answer = replace(answer, what=expected if proof.offsets is None else f"{expected} of x - offsets")
-        if proof.constant or (proof.at_rest and proof.noise is None) or not (proof.limits or proof.noise):
+        still = proof.constant or (proof.at_rest and proof.noise is None)
+        if still or proof.asked_messages is not None or not (proof.limits or proof.noise):
             return answer
         what = "limits of the gain leave" if proof.limits else "noise leaves"
         return replace(answer, status=OPEN, why=f"{what} something at T")

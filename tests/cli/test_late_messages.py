@@ -137,7 +137,7 @@ def test_no_delay_is_told_that_the_check_does_not_accept(monkeypatch: pytest.Mon
         ),
         (
             ("--quantisation", "0.1"),
-            "left open: bipartite consensus at T with late messages (nobody is proved to settle at T)",
+            "left open: bipartite consensus at T with rounded messages (nobody is proved to settle at T)",
         ),
         (
             ("--delay", "0.005", "--max-input", "1e6"),
