@@ -808,16 +808,20 @@ LAPLACIANS_OF_EDGES = [
 ]
 #: Comments that name columns or kinds of edges, titles and edges that look like each other, wide tables.
 TURNED = (
-    "target source score|to from trust|columns: target source weight|Format: target source weight|"
+    "target source score|to from trust|target, source weight|i j a(i,j)|"
+    "columns: target source weight|Format: target source weight|"
     "gene tf activation|Target,Source,Correlation|To Node, From Node, Sign|target gene,source gene,weight"
 )
 SAYS_UNDIRECTED = (
     "Type: undirected|weighted, undirected|is_directed: false|directed graph: no|directed false|"
-    "This is an undirected signed network"
+    "This is an undirected signed network|Undirected graph; self-loops were removed|undirected n=4 m=3|"
+    "Undirected friendship network. Edges were collected in 2019.|Undirected graph, not weighted"
 )
 SAYS_NOTHING = (
     "Undirected edges were replaced by two arcs|undirected: n|undirected False|Target node values|"
-    "to be weighted|not undirected|directed: true"
+    "to be weighted|not undirected|directed: true|directed no self-loops|Bidirected = no|directed graph no. 3|"
+    "For an undirected version see other.txt|Options: directed, undirected|Network from friends|"
+    "Data from activation|target is positive|i j a_ji|j i a_ij"
 )
 WIDE = "lexA,-1,-1,1\ncrp,1,1,1\n"
 MIRRORED = "# Undirected graph\n1 2 3\n2 1 3\n2 3 -1\n3 2 -1\n"
@@ -841,7 +845,20 @@ WORDS_OR_TITLES = [
     ),
     Input("g.csv", "country1,country2,cooperation\nUSA,RUS,-\nUSA,UK,+\n", "USA>RUS=-1 USA>UK=1"),
     Input("g.csv", "country1,country2,conflict\nUSA,RUS,-1\nUSA,UK,2\n", "USA>RUS=-1 USA>UK=2"),
-    Input("g.csv", "Gene1,Gene2,Excitation\na,b,activates\nb,c,inhibits\n", "a>b=1 b>c=-1"),
+    Input("g.csv", "Gene1,Gene2,Excitation\na,b,activates\nb,c,inhibits\n", says=("are titles, or an edge?",)),
+    Input("g.csv", "P1,P2,activation\nP3,P4,inhibition\n", "P1>P2=1 P3>P4=-1"),
+    Input("g.csv", "state1,state2,conflict\nUSA,USSR,1\nUSA,UK,0.5\n", says=("no negative number",)),
+    Input("g.csv", "TF,target,mor\nSOX2,1,1\nMYC,0,-1\n", "SOX2>1=1 MYC>0=-1"),
+    Input("g.csv", "EndNodes_1,EndNodes_2,Weight\nin,0,1\nhub,1,-1\n", "in>0=1 hub>1=-1"),
+    Input("g.csv", "protein1,protein2,score\na,,1\nb,,2\n", says=("target is empty",)),
+    Input("g.csv", "source,target,valence\na,b,0.5\nb,c,0.8\n", "a>b=1/2 b>c=4/5"),
+    Input("g.csv", "city1,city2,travel_time\na,b,3\nb,c,4\n", "a>b=3 b>c=4"),
+    Input("g.txt", "# rater,ratee,rating\n1,2,1\n2,3,-1\n", says=("--columns 1,2,3",)),
+    Input(
+        "g.json",
+        '{"directed": true, "graph": {"directed": false}, "links": [{"source": "a", "target": "b", "weight": 2}]}',
+        "a>b=2",
+    ),
     Input("g.csv", "ego,alter,like\na,b,+\nb,c,-\n", says=("line 1", "--edges listens")),
     Input("g.csv", "leader,f1,trust\nleader,f2,distrust\nf1,f2,trust\n", "leader>f1=1 leader>f2=-1 f1>f2=1"),
     Input("g.csv", "Start,Cln3,activates\nMBF,Clb5,activates\n", "Start>Cln3=1 MBF>Clb5=1"),

@@ -30,15 +30,14 @@ _SEPARATORS = ("\t", ",", ";", None)  # None: blanks
 _LOOKED_AT, _EXTRA, _SIGN_AT = 20, 10**5, {"first": "2,3,1", "second": "1,3,2"}
 #: From this number on a number after the third column is taken for a year or a time.
 _TIMES = 1900
-#: What comments say of undirected edges: a title, a value, a graph that is; and what is no such statement.
-_NO_VALUE = r"\s*[=:]?\s*(false|no?|0)\b"
+#: What comments say of undirected edges: of a graph that is, as a value, or of a directed one that it is none.
+_NO_VALUE = r"\s*[:=]\s*(false|no?|0)[\s.;,]*$"
 _UNDIRECTED = re.compile(
-    r"^[\s#%]*undirected\b|[:=,;]\s*undirected[\s.;,]*$|\b(an?|is|are)( \w+)? undirected\b"
-    rf"|directed( graph)?{_NO_VALUE}",
+    rf"^[\s#%]*undirected\b(?!{_NO_VALUE}|\s+(false|no)\s*$|\s+\w+\s+(was|were|have|has|had)\b)"
+    r"|[:=]\s*undirected[\s.;,]*$|^[\s#%]*(weighted|signed),?\s+undirected\b"
+    r"|\b(this|it|graph|network) is (an )?undirected\b"
+    rf"|^[\s#%]*(is[\s_]?)?directed( graph| network)?({_NO_VALUE}|\s+false\s*$)",
     re.IGNORECASE,
-)
-_OF_OTHERS = re.compile(
-    rf"undirected{_NO_VALUE}|\bnot\b|\b(was|were|been|replaced|dropped|removed|converted)\b", re.IGNORECASE
 )
 #: From this number on whole weights throughout are taken for seconds since 1970.
 _SECONDS = 10**8
@@ -193,7 +192,7 @@ def direction_of_comments(data: bytes, name: str) -> str:
                 mend = "give the nodes of each its own names, such as u1 and v1, and leave out this line"
                 raise FormatError(f"{name}, line {number}: % bip: two sets of nodes share their numbers; {mend}")
             return "% sym" if konect[1] == "sym" else ""
-        if _UNDIRECTED.search(line) and not _OF_OTHERS.search(line):
+        if _UNDIRECTED.search(line):
             return f"the comment {shorten(line.strip())}"
     return ""
 
@@ -311,18 +310,18 @@ def _refuse_titles(row: list[str], place: str, data: bytes) -> None:
 def _refuse_titles_of_comments(data: bytes, name: str, width: int) -> None:
     """Refuse rows without a header whose columns a comment names in another order, as numpy.savetxt writes it.
 
-    It has as many titles as rows have fields, between commas, tabs or semicolons if there are any, else between
-    blanks; what stands before a colon is none of them.
+    It has as many titles as rows have fields, between commas, semicolons or tabs, or between blanks and any of these;
+    what stands before a colon is none of them.
     """
     for line in comments_above(data):
         text = re.sub(r"^[\s#%]*(\w+\s*:)?\s*", "", line).rstrip()
-        separator = next((mark for mark in ",;\t" if mark in text), " ")
-        titles = [title.strip(" \"'") for title in re.split(rf"\s*{separator}\s*(?![^(]*\))", text)]
-        if len(titles) != width or len(set(map(plain, titles))) < width:
-            continue
-        if columns := columns_of_comment(titles, name):
-            mend = f"remove {line.strip()[0]} before {shorten(titles[0])}, or tell them: --columns {columns}"
-            raise FormatError(f"{name}: a comment names the columns; {mend}")
+        for separator in (",", ";", r"\t", r"[,;\t ]"):
+            titles = [title.strip(" \"'") for title in re.split(rf"\s*{separator}\s*(?![^(]*\))", text)]
+            if len(titles) != width or len(set(map(plain, titles))) < width:
+                continue
+            if columns := columns_of_comment(titles, name):
+                mend = f"remove {line.strip()[0]} before {shorten(titles[0])}, or tell them: --columns {columns}"
+                raise FormatError(f"{name}: a comment names the columns; {mend}")
 
 
 def comments_above(data: bytes) -> Iterator[str]:

@@ -172,7 +172,7 @@ class _Edges(EdgeList):
     def read(self, rows: Iterable[tuple[int, list[str]]]) -> None:
         """Read all rows; the weight of a row stands for both ends of its interval where these are empty."""
         low, high, _ = self.columns_told
-        weight, values = self.weight, {self.weight, *self.columns_told}
+        weight, values = self.weight, {self.weight, low, high}
 
         def with_ends(row: list[str]) -> list[str]:
             row = ["" if k in values and known(text) is None else text for k, text in enumerate(row)]

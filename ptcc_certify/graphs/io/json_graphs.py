@@ -63,10 +63,11 @@ def _undirected(document: dict[str, Any], name: str) -> str:
     beside = document.get("graph")
     for told in (document, beside if isinstance(beside, dict) else {}):
         for key, usual in (("directed", True), ("undirected", False)):
-            if told.get(key, usual) not in (True, False):
+            if key not in told:
+                continue
+            if told[key] not in (True, False):
                 raise FormatError(f"{name}: {key} is neither true nor false; write one")
-            if told.get(key, usual) != usual:
-                return f'"{key}": {json.dumps(told[key])}'
+            return "" if told[key] == usual else f'"{key}": {json.dumps(told[key])}'
     return ""
 
 

@@ -29,8 +29,8 @@ SIGN = (
     *("sign", "type", "edgetype", "effect", "relation", "relationship", "interaction", "interactiontype"),
     *("regulation", "polarity", "valence", "attitude", "mor"),
 )
-#: Titles of signs that may hold sizes, too.
-_SIZES = ("effect", "mor")
+#: Those whose numbers are no sizes.
+_RELATIONS = ("type", "edgetype", "relation", "relationship", "interactiontype")
 #: Titles of the least and the largest weight of an edge, and of whether it may fail, which make a family of a graph.
 _LEAST = ("weight_min", "min_weight", "w_min", "least", "min", "lower")
 _LARGEST = ("weight_max", "max_weight", "w_max", "largest", "max", "upper")
@@ -109,7 +109,7 @@ def code_among(values: Sequence[Fraction], title: str) -> Fraction | None:
     """Return a number that makes a column of relations one of codes; None where it holds signs, 1 and -1.
 
     A column called sign may hold 1 alone, or any number beside a negative one; fractions are no codes beside a
-    negative number, or where the title is one of sizes, too.
+    negative number, or where the title is not one of relations.
 
     Examples
     --------
@@ -123,7 +123,7 @@ def code_among(values: Sequence[Fraction], title: str) -> Fraction | None:
         return None if min(numbers, default=0) < 0 else next((v for v in values if v != 1), None)
     if not numbers or (-1 in numbers and numbers <= {-1, 0, 1}):
         return None
-    if any(v.denominator > 1 for v in numbers) and (min(numbers) < 0 or plain(title) in _SIZES):
+    if any(v.denominator > 1 for v in numbers) and (min(numbers) < 0 or plain(title) not in _RELATIONS):
         return None
     return next((v for v in values if v not in (-1, 1)), values[0])
 

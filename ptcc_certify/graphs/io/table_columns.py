@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from ptcc_certify.errors import FormatError
@@ -35,7 +35,9 @@ _ENDS = (rf"(target|tgt|dst|to){_REST}", rf"(end|dest|destination|influenced|reg
 #: Titles of times; of what is no node, and of what is no weight.
 _TIME = r"(?!.*(candid|mand)ate).*(time|date|year|stamp)"
 _NO_END = rf"|\W*|\d+|no|nr|id|idx|index|row|key|x|unnamed.*|(edge|link|row)(id|nr|no)?|{_TIME}|.*(?<!ac)(?<!vis)count"
-_NO_WEIGHT = rf"{_TIME}|(edge|link|row|pm|pubmed|article|paper|study)?id|doi"
+_NO_WEIGHT = (
+    r"(start|end|pub|publication|created|updated)?(date|year|time|(time)?stamp)|(edge|link|row|pm|pubmed)?id|doi"
+)
 #: Two titles that say nothing of a direction, the first is then who is heard: Gene1 and Gene2, a and b.
 _NEUTRAL = r"(?P<what>.*?)(1.(?P=what)2|a.(?P=what)b|i.(?P=what)j|u.(?P=what)v|s.(?P=what)t|0.(?P=what)1)(?P<rest>\w*)"
 #: Titles of weights that are entries of a matrix, where k may listen to l: a_kl, w(i,j).
@@ -119,7 +121,7 @@ def columns_of(first: Sequence[str], others: Sequence[Sequence[str]], place: str
     source, target, known = _ends(titles, place)
     if not {source, target}.isdisjoint({weight, sign}):
         raise FormatError(f"{place}: {_no_ends(titles)}")
-    if {source, target} == {0, 1}:
+    if {source, target} == {0, 1} and not (known and _both_ends(titles)) and not _tells_weight(titles[weight]):
         _refuse_wide(titles, others, place)
     if re.fullmatch(_NO_WEIGHT, plain(titles[weight])):
         raise FormatError(f"{place}: the header names no weight; {_TELL_ALL}")
@@ -159,8 +161,8 @@ def _refuse_wide(titles: Sequence[str], others: Sequence[Sequence[str]], place: 
     named = not all(is_number(row[0]) for row in rows)
     if not (rows and named and all(is_entry(text) for row in rows for text in row[1:] if text)):
         return
-    ends = {row[1] for row in rows}
-    if ends <= {"0", "1", ""} or not all(text.isdigit() for text in ends):
+    ends = {row[1] for row in rows} - {""}
+    if ends and (ends <= {"0", "1"} or not all(text.isdigit() for text in ends)):
         what = "looks like a matrix with names, and its rows and columns have different ones"
         raise FormatError(f"{place}: {what}; give both the same, or write rows of edges")
 
@@ -232,28 +234,33 @@ def columns_of_comment(titles: Sequence[str], place: str) -> str:
     written = [plain(title) for title in titles]
     source, target, _ = edge_columns(titles, place) or (None, None, None)
     if source is not None and target is not None:
-        turned = written[source] == "rater"
+        rater = written[source] == "rater"
         rest = [k for k in range(len(titles)) if k not in (source, target)]
-        if not turned and ((source, target) == (0, 1) or not rest):
+        if not rest or ((source, target) == (0, 1) and not rater):
             return ""
         weight = next((k for k in rest if _tells_weight(titles[k])), rest[0])
-        if turned or {source, target} == {0, 1} or _tells_weight(titles[weight]):
-            return ",".join(str(k + 1) for k in ((target, source) if turned else (source, target)) + (weight,))
-        return ""
+        known = {source, target} == {0, 1} or _tells_weight(titles[weight])
+        return ",".join(str(k + 1) for k in (source, target, weight)) if known else ""
     if len(titles) < 3:
         return ""
     listens, heard = "|".join((rf"({_LISTENERS}){_REST}", *_ENDS)), "|".join((rf"({_HEARD}){_REST}", *_STARTS))
     turned = bool(re.fullmatch(listens, written[0]) or re.fullmatch(heard, written[1]))
-    weights = [k for k in range(2, len(titles)) if _tells_weight(titles[k])]
-    if re.fullmatch(_OF_MATRIX, written[2]):
-        weights, turned = [2], True
+    weights = [k for k in range(2, len(titles)) if _tells_weight(titles[k], _both_ends(titles))]
+    if entry := re.fullmatch(_OF_MATRIX, written[2]):
+        weights, turned = [2], written[1] != entry[1][0]
     return f"2,1,{weights[0] + 1}" if turned and weights else ""
 
 
-def _tells_weight(title: str) -> bool:
-    """Tell whether a word in a comment is the title of a weight or a sign, or one for a sign; plurals are prose."""
+def _tells_weight(title: str, words: bool = False) -> bool:
+    """Tell whether a word is the title of a weight or a sign, or one for a sign among ``words``; plurals are prose."""
     size = (is_size(title) or is_signed(title)) and not title.lower().endswith(("s", "ed"))
-    return size or names_edges([title]) or sign_of_word(title) is not None
+    return size or names_edges([title]) or (words and sign_of_word(title) is not None)
+
+
+def _both_ends(titles: Sequence[str]) -> bool:
+    """Tell whether both of the first two titles are words for an end, or for a node such as gene."""
+    words = "|".join((rf"({_LISTENERS}){_REST}", rf"({_HEARD}){_REST}", *_STARTS, *_ENDS, _REST))
+    return all(re.fullmatch(words, plain(title)) for title in titles[:2])
 
 
 def asks_of_corner(corner: str, line: str) -> str:
@@ -285,14 +292,19 @@ def _is_header(titles: Sequence[str], weight: int, others: Sequence[Sequence[str
     below = [row[weight].strip() for row in others if len(row) > max(weight, 1)]
     if is_entry(title):
         nodes = {field.strip() for row in others for field in row[:2]}
-        return bool(below) and nodes.isdisjoint(titles[:2]) and _is_title(titles, title, below, place)
+        if not below or not nodes.isdisjoint(titles[:2]) or not _is_title(titles, title, below, nodes, place):
+            return False
+        if sign_of_word(title) == -1 and all(is_number(text) and text[0] != "-" for text in below):
+            what = f"column {shorten(title)} has no negative number: sizes of negative weights, or signs?"
+            raise FormatError(f"{place}: {what} Give weights their signs in a column called weight")
+        return True
     return bool(below) and (all(map(is_entry, below)) or (is_sign(title) and all(below)))
 
 
-def _is_title(titles: Sequence[str], title: str, below: Sequence[str], place: str) -> bool:
+def _is_title(titles: Sequence[str], title: str, below: Sequence[str], nodes: Iterable[str], place: str) -> bool:
     """Tell whether a word for a sign is a title: above numbers and symbols; above words, where both ends have titles.
 
-    Where one end alone has a title, or both are numbered above the same word, it may be either; verbs are none.
+    Where one end alone has a title, or both are numbered as no node below is, it may be either; verbs are none.
     """
     if not all(map(is_entry, below)):
         return False
@@ -303,7 +315,9 @@ def _is_title(titles: Sequence[str], title: str, below: Sequence[str], place: st
     numbered = re.fullmatch(_NEUTRAL, " ".join(map(plain, titles[:2]))) is not None and len(titles[0]) > 1
     if title.lower().endswith("s") or not (any(ends) or numbered):
         return False
-    if not all(ends) and (any(ends) or title.lower() in map(str.lower, below)):
+    if not any(ends) and any(re.fullmatch(re.escape(titles[0][:-1]) + r"\d+", node) for node in nodes):
+        return False
+    if not all(ends):
         what = f"{', '.join(map(shorten, titles[:3]))} are titles, or an edge?"
         raise FormatError(f"{place}: {what} Name who is heard source, who listens target, and the weight weight")
     return True
