@@ -652,6 +652,17 @@ def test_starts_of_any_size_are_reported(size: str, tmp_path: Path):
     assert (tmp_path / "c_decay.pdf").exists() == (size != "0")
 
 
+@pytest.mark.parametrize("start", [["1", "1/3", "1/3"], ["1", "1/3", "0.33333333333333333333"]])
+def test_where_agents_begin_at_their_ends_or_all_but_there_a_page_has_no_decay(start: list[str]):
+    graph = SignedDigraph.from_edges([("lead", "a", 1), ("a", "b", 1), ("b", "a", -1)])
+    made = certify(graph, NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), start)
+    saved = read_certificate(made.to_dict()).with_simulation()
+    page = report_html(saved)
+    assert 'id="figure-states"' in page and 'id="figure-decay"' not in page
+    with pytest.raises(ParameterError, match="there is no decay to draw"):
+        plot_decay(saved)
+
+
 def test_a_statement_whose_figure_has_no_place_writes_nothing(tmp_path: Path):
     example("nominal").save(tmp_path / "c.json")
     (tmp_path / "s_decay.pdf").mkdir()
