@@ -342,6 +342,14 @@ def test_what_a_certificate_does_not_say_is_said():
     assert "article leaves disconnected graphs out" in caveats("disconnected")
 
 
+def test_the_page_of_capped_vehicles_does_not_say_that_their_gain_is_infinite():
+    vehicles, messages = Agents(order=2, exchange="virtual"), LateMessages("0.01", gain_cap=20)
+    graph = SignedDigraph.from_edges([("a", "b", 1)])
+    made = certify(graph, NOMINAL, InitialState([0, 2], v0=[0, 1]), agents=vehicles, messages=messages)
+    page = sound(report_html(read_certificate(made.to_dict()))).text
+    assert "The gain is infinite" not in page and "What is told without limits is of a gain that is infinite" in page
+
+
 def test_the_page_of_a_design_says_what_was_asked_and_of_which_states_its_bounds_are(tmp_path: Path):
     graph = SignedDigraph.from_edges([(1, 2, 3), (2, 3, -1), (3, 1, 1)])
     asked = {"max_input": 20, "initial_bound": 3, "deadline": "2.5"}
