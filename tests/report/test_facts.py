@@ -122,9 +122,11 @@ def test_agents_of_order_n_are_not_single_integrators_and_end_at_their_places(tm
     assert all("without the cap" in text for head in ("x(T)", "v(T)") for text in told(capped, head))
     formed = ptcc.certify(path, law, start, agents=ptcc.Agents(order=2, offsets=[0, 1]), asks=asks)
     assert told(formed, "error")[0].endswith("of their places in the common motion")
+    both = ptcc.certify(path, law, start, agents=ptcc.Agents(order=2, offsets=[0, 1], gain_cap=20), asks=asks)
     for name, certificate, says in (
-        ("capped", capped, "But for what the cap leaves: All agents"),
-        ("formed", formed, "Of x \N{MINUS SIGN} offsets: All agents"),
+        ("both", both, "Of x \N{MINUS SIGN} offsets, but for what the cap leaves: all agents"),
+        ("capped", capped, "But for what the cap leaves: all agents"),
+        ("formed", formed, "Of x \N{MINUS SIGN} offsets: all agents"),
     ):
         certificate.save(tmp_path / f"{name}.json")
         ptcc.write_report(tmp_path / f"{name}.json", tmp_path / f"{name}.html")

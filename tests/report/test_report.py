@@ -457,7 +457,7 @@ def test_isolated_agents_under_the_sliding_mode_keep_the_difference(tmp_path: Pa
 def test_the_heading_names_the_sharpest_claim(tmp_path: Path):
     allies = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("b", "c", 1)])
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
-    for agents, told in ((None, "Consensus at T"), (Agents(order=2), "Consensus of double integrators")):
+    for agents, told in ((None, "Consensus at T"), (Agents(order=2), "Consensus of double integrators at T = 1</h1>")):
         made = certify(allies, protocol, [1, 2, 3], agents=agents, asks=Asks(method="paper", simulation=False))
         assert f"<h1>{told}" in reported(made, tmp_path, simulation=False)
 
