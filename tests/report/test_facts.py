@@ -113,6 +113,13 @@ def test_what_is_told_of_other_agents_or_another_law_says_so(tmp_path: Path):
     assert "without disturbances</h1>" in pages["disturbed"]
 
 
+def test_a_bound_of_initial_states_in_a_formation_is_told_of_positions():
+    path, asks = [("a", "b", 1), ("b", "a", 1)], ptcc.Asks(simulation=False, initial_set=2)
+    made = ptcc.certify(path, ptcc.NominalProtocol(), agents=ptcc.Agents(order=1, offsets=[5, -5]), asks=asks)
+    for certificate in (made, ptcc.read_certificate(made.to_dict())):
+        assert told(certificate, "protocol")[0].endswith("; all |x_k(0)| <= 2, in a formation")
+
+
 def test_agents_of_order_n_are_not_single_integrators_and_end_at_their_places(tmp_path: Path):
     path = [("a", "b", 1), ("b", "a", 1)]
     start, asks = ptcc.InitialState([1, 2], v0=[0, 1]), ptcc.Asks(simulation=False)
@@ -131,10 +138,3 @@ def test_agents_of_order_n_are_not_single_integrators_and_end_at_their_places(tm
         certificate.save(tmp_path / f"{name}.json")
         ptcc.write_report(tmp_path / f"{name}.json", tmp_path / f"{name}.html")
         assert says in (tmp_path / f"{name}.html").read_text("utf-8")
-
-
-def test_a_bound_of_initial_states_in_a_formation_is_told_of_positions():
-    path, asks = [("a", "b", 1), ("b", "a", 1)], ptcc.Asks(simulation=False, initial_set=2)
-    made = ptcc.certify(path, ptcc.NominalProtocol(), agents=ptcc.Agents(order=1, offsets=[5, -5]), asks=asks)
-    for certificate in (made, ptcc.read_certificate(made.to_dict())):
-        assert told(certificate, "protocol")[0].endswith("; all |x_k(0)| <= 2, in a formation")
