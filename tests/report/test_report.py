@@ -667,7 +667,7 @@ def test_where_agents_begin_at_their_ends_or_all_but_there_a_page_has_no_decay(s
     saved = read_certificate(made.to_dict()).with_simulation()
     page = report_html(saved)
     assert 'id="figure-states"' in page and 'id="figure-decay"' not in page
-    with pytest.raises(ParameterError, match="there is no decay to draw"):
+    with pytest.raises(ParameterError, match="nothing decays: every agent begins where it ends"):
         plot_decay(saved)
 
 

@@ -26,7 +26,7 @@ _BELOW_FLOOR = 1e-2
 #: 1 - t/T down to which bounds are drawn where there is no run, and how many instants.
 _LAST, _INSTANTS = 1e-8, 401
 #: What is told where there is nothing to draw.
-_NONE = "every agent begins where it ends, or nearer to it than a run tells: there is no decay to draw"
+_NONE = "nothing decays: every agent begins where it ends, or nearer to it than a run tells; draw its states"
 #: The name of the best bound among those of the Lyapunov functions.
 _BEST = "best"
 
