@@ -307,6 +307,11 @@ class AgentsAnswer(ABC):
     def deviation_bound(self, remaining: np.ndarray) -> np.ndarray:
         """Return (N, n, M) bounds of the deviation of each derivative from the common motion."""
 
+    @cached_property
+    def never_off(self) -> bool:
+        """Whether bounds of all deviations are 0 at first, and therefore ever."""
+        return not self.deviation_bound(np.array([1.0])).any()
+
     @abstractmethod
     def compare(self, run: AgentsTrajectory) -> AgentsComparison | None:
         """Compare a run with what is proved of it; None where nothing disagrees."""

@@ -79,9 +79,11 @@ class AgentsPart(AgentsAnswer):
     def settles(self) -> bool:
         """Whether the behaviour of the claim is proved at ``T`` itself, of positions less their places in a formation.
 
-        A capped gain leaves something there, and gains without a Lyapunov function prove nothing.
+        A capped gain leaves something there unless nothing is off, and gains without a Lyapunov function prove nothing.
         """
-        return self.structure.graph.n_edges == 0 or (bool(self.functions) and self.protocol.gain_cap is None)
+        if self.alone or self.protocol.gain_cap is None:
+            return self.alone or bool(self.functions)
+        return self.residual is not None and not any(map(any, self.residual.agents))
 
     @property
     def unbounded(self) -> tuple[tuple[str, Change], ...]:

@@ -29,6 +29,8 @@ from ptcc_certify.certificate.unverified_section import (
     read_unproved,
     read_unproved_signals,
     read_upper_bound,
+    with_longest_delays,
+    with_longest_period,
 )
 from ptcc_certify.checker.attracting_boxes import AttractingBox, KeptBox
 from ptcc_certify.checker.protocol import NominalSection, ReachingTimes, SlidingSection
@@ -53,15 +55,16 @@ def read_document(source: Source) -> tuple[GraphProof | FamilyProof, Observation
         subject, effort = certificate_family(document["graph"], source.files), None
     else:
         subject = analyse(certificate_graph(document, source.files))
-        effort = read_effort(source.report, subject, protocol, state)
+        effort = with_longest_period(read_effort(source.report, subject, protocol, state), document["unverified"])
     request = read_request(document["unverified"], None if effort is None else effort.initial_set, not of_family)
     request = replace(request, **read_unproved(document, subject))
     relative = state is None if isinstance(subject, Family) else sections["final_state"] is None
     late = read_late(source.report, subject, protocol, relative)
+    late = late or nothing_proved(request.messages, request.leaders, subject, protocol, state is None)
     words: dict[str, Any] = {
         "question": Question(subject, protocol, state, fractions(sections["sliding_variable"]), request),
         "reaching": read_reaching(sections.get("reaching_time"), protocol),
-        "late": late or nothing_proved(request.messages, request.leaders, subject, protocol, state is None),
+        "late": with_longest_delays(late, document["unverified"]),
         "tracking": read_tracking(source.report, subject, protocol, relative),
         "source": replace(source, effort=effort),
     }

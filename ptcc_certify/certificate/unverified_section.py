@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal
@@ -13,7 +14,7 @@ import numpy as np
 from ptcc_certify.bounds.delay.case import LateCase
 from ptcc_certify.bounds.delay.late_messages import LateBounds, delays, read_messages
 from ptcc_certify.bounds.envelope import FRACTIONS, LAST_INSTANTS
-from ptcc_certify.bounds.input.effort import LIMITS
+from ptcc_certify.bounds.input.effort import LIMITS, Effort
 from ptcc_certify.bounds.tracking import asked_leaders, read_leaders
 from ptcc_certify.certificate.constrained_switching.sections import read_signals, signals_section
 from ptcc_certify.certificate.evidence import Evidence, Observations
@@ -217,6 +218,9 @@ def write_unverified(certificate: Evidence) -> dict[str, Any]:
             "at": None if proof.at is None else float(proof.at),
             "searched": {kind: finite(rate) for kind, rate in search.searched.items()},
             "diagonal_limit": finite(search.diagonal_limit),
+            "longest_period": None if proof.effort is None else text(proof.effort.longest_period),
+            "longest_delay": None if proof.late is None else finite(proof.late.longest_delay),
+            "longest_age": None if proof.late is None else text(proof.late.enough),
         },
         "residual": {name: finite(envelope.residual(q)) for name, q in residual.items()} if proof.direct else None,
         "final_state": floats,
@@ -257,6 +261,23 @@ def _write_run(certificate: Evidence) -> dict[str, Any] | None:
 def read_observations(section: Mapping[str, Any]) -> Observations:
     """Read what the file says of searches; other observations are made anew."""
     return Observations(cut_off=_texts(section.get("cut_off")), notes=_texts(section.get("notes")))
+
+
+def with_longest_period(effort: Effort | None, unverified: Mapping[str, Any]) -> Effort | None:
+    """Return bounds of the input with the period that the file names, which would be certified."""
+    if effort is None:
+        return None
+    return replace(effort, longest_period=_positive(unverified.get("search"), "longest_period"))
+
+
+def with_longest_delays(late: LateBounds | None, unverified: Mapping[str, Any]) -> LateBounds | None:
+    """Return what is proved with late messages, with the delays that the file names, which would be certified."""
+    search = unverified.get("search")
+    delay = search.get("longest_delay") if isinstance(search, dict) else None
+    known = isinstance(delay, float) and 0 < delay < math.inf
+    if late is None:
+        return None
+    return replace(late, longest_delay=delay if known else None, enough=_positive(search, "longest_age"))
 
 
 def _write_request(request: Request) -> dict[str, Any]:

@@ -157,7 +157,7 @@ def _use_of_agents(part: AgentsAnswer) -> Use:
     fall = part.fall(float(last[0]))
     worst = float(part.deviation_bound(last)[:, 0].max(initial=0.0))
     when = "T" if capped else "0.99 T"
-    remark = f"every position within {up(worst, 2)} of its place at {when}"
+    remark = f"every position within {'0' if part.never_off else up(worst, 2)} of its place at {when}"
     if part.initial_state is None or not math.isfinite(worst):
         return Use(fall <= USEFUL, f"deviations at {when} are {up(fall, 2)} of {part.first_ones}", caveat, advice)
     useful = worst <= USEFUL * part.longest_way if part.longest_way else fall <= USEFUL

@@ -251,13 +251,14 @@ def _title(saved: Certificate) -> Markup:
     """Say what the certificate is about."""
     claims, deadline = saved.graph_proof.claims, "T" if saved.protocol.reaching is None else "T_r + T_s"
     behaviour = claims[0].sharpest if len(claims) == 1 else f"{len(claims):,} components settle"
-    text = Markup("{} at {} = {}").format(behaviour, deadline, rational(saved.protocol.T)).replace("= \u2248", "\u2248")
-    if saved.proof.agents is not None:
-        text = Markup("{} of {}").format(behaviour, plant_text(saved.proof.agents.protocol.plant))
-        text += claimed_of(saved.proof.agents).replace(" - ", " \N{MINUS SIGN} ")
-    elif saved.proof.constant:
+    text = Markup(behaviour)
+    if (part := saved.proof.agents) is not None:
+        of = claimed_of(part).replace(" - ", " \N{MINUS SIGN} ")
+        text = Markup("{} of {}{}").format(behaviour, plant_text(part.protocol.plant), of)
+    text += Markup(" at {} = {}").format(deadline, rational(saved.protocol.T)).replace("= \u2248", "\u2248")
+    if part is None and saved.proof.constant:
         text = Markup("every agent keeps {}").format("its state" if saved.direct else "x \u2212 \u03c3")
-    if saved.proof.agents is None:
+    if part is None:
         text += "" if saved.proof.offsets is None else " of x \N{MINUS SIGN} offsets"
         text += _without(saved)
     return text[:1].upper() + text[1:] if saved.verdict == "certified" else "Undecided: " + text

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any
 
 from markupsafe import Markup
@@ -18,7 +19,7 @@ from ptcc_certify.model.base import Protocol
 from ptcc_certify.report.html_text import set_text
 from ptcc_certify.report.plots.agents_motion import plot_formation, plot_motion
 from ptcc_certify.report.plots.counterexample import plot_counterexample
-from ptcc_certify.report.plots.decay import plot_decay
+from ptcc_certify.report.plots.decay import NothingDecays, plot_decay
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.input import plot_input
 from ptcc_certify.report.plots.large_graphs import plot_degrees, plot_final_states
@@ -114,16 +115,24 @@ def draw(
     if run is not None:
         slid = run.sliding is not None
         there["states"] = n <= TRACED_NODES and not saved.proof.constant
-        there["decay"] = (
-            saved.comparison is not None and bool(saved.graph_proof.envelope.functions) and bool(run.error.any())
-        )
+        there["decay"] = saved.comparison is not None and bool(saved.graph_proof.envelope.functions)
         there["sliding"] = slid and not saved.direct and n <= TRACED_NODES
         there["input"] = n <= TRACED_NODES and (slid or not saved.proof.constant)
-    figures = {name: PLOTS[name](saved).figure for name in wanted if there.get(name)}
+    figures = _figures(saved, [name for name in wanted if there.get(name)])
     if agents_run is not None and saved.proof.agents is not None:
         figures["motion"] = plot_motion(agents_run)
         if saved.proof.agents.dimension == 2:
             figures["formation"] = plot_formation(agents_run).figure
+    return figures
+
+
+def _figures(saved: Certificate, names: Sequence[str], runs: Sequence[Trajectory] = ()) -> dict[str, Any]:
+    """Draw figures, some of them with runs of a family; a decay only if something decays."""
+    figures = {}
+    for name in names:
+        taken = {"runs": runs} if saved.of_family and name in ("states", "input", "decay") else {}
+        with suppress(NothingDecays):
+            figures[name] = PLOTS[name](saved, **taken).figure
     return figures
 
 
@@ -144,16 +153,10 @@ def _draw_family(
     proof = saved.family_proof
     small = bool(runs) and proof.family.n_nodes <= TRACED_NODES
     there = {"graph": proof.family.n_nodes <= DRAWN_NODES, "states": small, "input": small}
-    moves = bool(runs) and proof.common and proof.rate is not None
-    there["decay"] = moves and bool(proof.deviation_bound([1.0]).max() > 0)
+    there["decay"] = bool(runs) and proof.common and proof.rate is not None
     there["late"] = proof.late is not None and bool(proof.late.rows)
     there["tracking"] = proof.tracking is not None
-    taken = ("states", "input", "decay")
-    figures = {
-        name: PLOTS[name](saved, **({"runs": runs} if name in taken else {})).figure
-        for name in wanted
-        if there.get(name)
-    }
+    figures = _figures(saved, [name for name in wanted if there.get(name)], runs)
     for number, (_, _, component, one) in enumerate(why):
         try:
             figures[f"why{number}"] = plot_counterexample(component, why=one, protocol=saved.protocol).figure

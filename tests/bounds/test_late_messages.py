@@ -560,6 +560,31 @@ def test_without_a_cap_no_input_is_bounded() -> None:
         assert late is not None and late.rows and late.input is None
 
 
+def test_where_late_messages_change_nothing_the_input_is_bounded_without_a_cap() -> None:
+    star = SignedDigraph.from_edges([("l", "a", 1), ("l", "b", -1)])
+    led = SignedDigraph.from_edges([("l", "a", 1), ("a", "b", 1), ("b", "a", -1)])
+    quick, slow = (NominalProtocol(T=1, rho1=1, rho2=1, kappa=k) for k in (1, "0.9"))
+    late = [
+        certify(graph, protocol, x0, messages=LateMessages("0.1"), asks=Asks(simulation=False)).late
+        for graph, protocol, x0 in ((star, quick, [1, 3, 2]), (star, slow, [1, 3, 2]), (led, slow, [1, "1/3", "1/3"]))
+    ]
+    assert late[0].inputs.max() == pytest.approx(2 * 3) and late[1].inputs is None and not late[2].inputs.any()
+    assert late[2].largest == 0 and "every agent within 0 of its final state at T" in repr(late[2])
+
+
+def test_what_makes_the_input_unbounded_is_told_as_it_was_asked() -> None:
+    star = SignedDigraph.from_edges([("l", "a", 1), ("l", "b", -1)])
+
+    def told(rho2: str, messages: LateMessages, **more: Any) -> str:
+        protocol = NominalProtocol(T=1, rho1=1, rho2=rho2, kappa=1)
+        made = certify(star, protocol, [1, 3, 2], messages=messages, asks=Asks(simulation=False), **more)
+        return " ".join(made.summary().split())
+
+    assert "not proved bounded: not all who listen have rho2 kappa times their" in told("0.9", LateMessages("0.1"))
+    assert "not proved bounded with rounded messages: a gain" in told("1", LateMessages(value_error="0.1"))
+    assert "not proved bounded with late messages: a gain" in told("1", LateMessages("0.1", value_error="0.1"))
+
+
 # ---------------------------------------------------------------------- late messages behind leaders that move
 
 
@@ -753,6 +778,7 @@ def test_the_longest_delay_behind_leaders_that_move_is_certified() -> None:
     options: dict[str, Any] = {"leaders": leaders, "expectations": asked, "simulation": False, "method": "paper"}
     made = certify_words(graph, protocol, [1, 2, 3], messages=messages, **options)
     assert made.late is not None and made.late.enough is not None and 0 < made.late.enough < Fraction(1, 5)
+    assert "every follower within" in repr(made.late) and "of its target at T)" in repr(made.late)
     structure, x0, again = made.structure, [Fraction(x) for x in (1, 2, 3)], replace(messages, delay=made.late.enough)
     ends = final_state(structure, x0).intervals
     assert bound_late(LateCase(structure, protocol, again, x0, ends, leaders)).largest <= 0.05

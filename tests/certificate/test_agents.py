@@ -254,6 +254,17 @@ def test_a_behaviour_under_a_cap_is_not_told_to_be_met_in_a_formation(expected: 
     assert found.assessment.answers[0].status == OPEN
 
 
+def test_agents_that_begin_in_their_common_motion_keep_it_under_a_cap_exactly():
+    camps = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 2), ("b", "c", -1), ("c", "b", -1)])
+    agents, asked = Agents(order=2, gain_cap=20), Asks(simulation=False, expectations="bipartite-consensus")
+    x0 = ["0.3", "0.3", "-0.3"]
+    made = certify(camps, NOMINAL, InitialState(x0, v0=[1, 1, -1]), agents=agents, asks=asked)
+    assert made.assessment.text.startswith("met: bipartite consensus; certified")
+    assert "at T positions within 0, velocities within 0 of the common motion" in " ".join(made.summary().split())
+    off = certify(camps, NOMINAL, InitialState(x0, v0=[1, 1, 1]), agents=agents, asks=asked)
+    assert "left open: bipartite consensus (the capped gain leaves something at T)" in off.assessment.text
+
+
 def test_biases_under_a_cap_make_the_same_certificate_as_the_places_that_they_make():
     biases = [0, 0, 0, 1]
     ours = certify(

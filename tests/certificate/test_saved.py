@@ -28,6 +28,7 @@ from ptcc_certify.checker import digest
 from ptcc_certify.checker.input import InputSection
 from ptcc_certify.errors import FormatError, ParameterError
 from ptcc_certify.examples import EXAMPLES, load_graph
+from ptcc_certify.model.asks import Expectations
 
 NOMINAL = ptcc.NominalProtocol(T="0.6", rho1="0.2", rho2="0.5", kappa=1)
 SLIDING = ptcc.SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
@@ -179,6 +180,31 @@ def test_the_bound_is_never_below_what_the_exact_numbers_say(name: str, tmp_path
 
 def float_ball(x: Fraction) -> flint.arb:
     return flint.arb(x.numerator) / flint.arb(x.denominator)
+
+
+LITTLE = ptcc.Asks(expectations=Expectations(max_residual=Fraction(1, 1000)))
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"limits": [ptcc.GainLimits(sample_period="0.2")]}, "certified with a period of"),
+        (
+            {"messages": ptcc.LateMessages("0.1", gain_cap=20), "asks": LITTLE},
+            "limit is a delay of",
+        ),
+        (
+            {"messages": ptcc.LateMessages("0.1", gain_cap=20), "asks": LITTLE},
+            "where nothing is older than",
+        ),
+    ],
+    ids=["period", "delay", "age"],
+)
+def test_what_would_be_certified_instead_comes_back(options: dict[str, Any], says: str, tmp_path: Path):
+    camps = ptcc.SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 2), ("b", "c", -1), ("c", "b", -1)])
+    protocol = ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+    made = ptcc.certify(camps, protocol, [1, 3, -2], **options)
+    assert says in made.assessment.text and written(made, tmp_path).assessment.text == made.assessment.text
 
 
 def test_side_files_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

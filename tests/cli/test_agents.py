@@ -33,7 +33,7 @@ def test_a_certificate_of_double_integrators_is_written_checked_drawn_and_shown(
     assert refused.code == 2 and "ask for --what motion or formation or input" in refused.err
     assert ptcc("report", file, "-o", str(tmp_path / "c.html")).code == 0
     page = (tmp_path / "c.html").read_text(encoding="utf-8")
-    assert "of double integrators</h1>" in page and "agents are single integrators" not in page
+    assert "of double integrators at T = " in page and "agents are single integrators" not in page
     assert ptcc("report", file, "-o", str(tmp_path / "c.tex")).code == 0
     statement = (tmp_path / "c.tex").read_text(encoding="utf-8")
     assert "Let the agents be double integrators: in each" in statement and r"\dot x_{k} = u_{k}" not in statement

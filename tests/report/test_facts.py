@@ -115,6 +115,13 @@ def test_what_is_told_of_other_agents_or_another_law_says_so(tmp_path: Path):
     assert "without disturbances</h1>" in pages["disturbed"]
 
 
+def test_a_bound_of_initial_states_in_a_formation_is_told_of_positions():
+    path, asks = [("a", "b", 1), ("b", "a", 1)], ptcc.Asks(simulation=False, initial_set=2)
+    made = ptcc.certify(path, ptcc.NominalProtocol(), agents=ptcc.Agents(order=1, offsets=[5, -5]), asks=asks)
+    for certificate in (made, ptcc.read_certificate(made.to_dict())):
+        assert told(certificate, "protocol")[0].endswith("; all |x_k(0)| <= 2, in a formation")
+
+
 def test_agents_of_order_n_are_not_single_integrators_and_end_at_their_places(tmp_path: Path):
     path = [("a", "b", 1), ("b", "a", 1)]
     start, asks = ptcc.InitialState([1, 2], v0=[0, 1]), ptcc.Asks(simulation=False)
@@ -124,9 +131,11 @@ def test_agents_of_order_n_are_not_single_integrators_and_end_at_their_places(tm
     assert all("without the cap" in text for head in ("x(T)", "v(T)") for text in told(capped, head))
     formed = ptcc.certify(path, law, start, agents=ptcc.Agents(order=2, offsets=[0, 1]), asks=asks)
     assert told(formed, "error")[0].endswith("of their places in the common motion")
+    both = ptcc.certify(path, law, start, agents=ptcc.Agents(order=2, offsets=[0, 1], gain_cap=20), asks=asks)
     for name, certificate, says in (
-        ("capped", capped, "But for what the cap leaves: All agents"),
-        ("formed", formed, "Of x \N{MINUS SIGN} offsets: All agents"),
+        ("both", both, "Of x \N{MINUS SIGN} offsets, but for what the cap leaves: all agents"),
+        ("capped", capped, "But for what the cap leaves: all agents"),
+        ("formed", formed, "Of x \N{MINUS SIGN} offsets: all agents"),
     ):
         certificate.save(tmp_path / f"{name}.json")
         ptcc.write_report(tmp_path / f"{name}.json", tmp_path / f"{name}.html")

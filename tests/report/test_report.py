@@ -342,6 +342,14 @@ def test_what_a_certificate_does_not_say_is_said():
     assert "article leaves disconnected graphs out" in caveats("disconnected")
 
 
+def test_the_page_of_capped_vehicles_does_not_say_that_their_gain_is_infinite():
+    vehicles, messages = Agents(order=2, exchange="virtual"), LateMessages("0.01", gain_cap=20)
+    graph = SignedDigraph.from_edges([("a", "b", 1)])
+    made = certify(graph, NOMINAL, InitialState([0, 2], v0=[0, 1]), agents=vehicles, messages=messages)
+    page = sound(report_html(read_certificate(made.to_dict()))).text
+    assert "The gain is infinite" not in page and "What is told without limits is of a gain that is infinite" in page
+
+
 def test_the_page_of_a_design_says_what_was_asked_and_of_which_states_its_bounds_are(tmp_path: Path):
     graph = SignedDigraph.from_edges([(1, 2, 3), (2, 3, -1), (3, 1, 1)])
     asked = {"max_input": 20, "initial_bound": 3, "deadline": "2.5"}
@@ -449,7 +457,7 @@ def test_isolated_agents_under_the_sliding_mode_keep_the_difference(tmp_path: Pa
 def test_the_heading_names_the_sharpest_claim(tmp_path: Path):
     allies = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("b", "c", 1)])
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
-    for agents, told in ((None, "Consensus at T"), (Agents(order=2), "Consensus of double integrators")):
+    for agents, told in ((None, "Consensus at T"), (Agents(order=2), "Consensus of double integrators at T = 1</h1>")):
         made = certify(allies, protocol, [1, 2, 3], agents=agents, asks=Asks(method="paper", simulation=False))
         assert f"<h1>{told}" in reported(made, tmp_path, simulation=False)
 
@@ -650,6 +658,17 @@ def test_starts_of_any_size_are_reported(size: str, tmp_path: Path):
     for name in ("c.html", "c.tex"):
         assert write_report(tmp_path / "c.json", tmp_path / name) == "certified"
     assert (tmp_path / "c_decay.pdf").exists() == (size != "0")
+
+
+@pytest.mark.parametrize("start", [["1", "1/3", "1/3"], ["1", "1/3", "0.33333333333333333333"]])
+def test_where_agents_begin_at_their_ends_or_all_but_there_a_page_has_no_decay(start: list[str]):
+    graph = SignedDigraph.from_edges([("lead", "a", 1), ("a", "b", 1), ("b", "a", -1)])
+    made = certify(graph, NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), start)
+    saved = read_certificate(made.to_dict()).with_simulation()
+    page = report_html(saved)
+    assert 'id="figure-states"' in page and 'id="figure-decay"' not in page
+    with pytest.raises(ParameterError, match="nothing decays: every agent begins where it ends"):
+        plot_decay(saved)
 
 
 def test_a_statement_whose_figure_has_no_place_writes_nothing(tmp_path: Path):

@@ -67,8 +67,8 @@ class RowBound:
 
     def residual(self, after: bool = False) -> np.ndarray:
         """Return what bounds ``|x_k - x_k*|`` at ``T``, or from there on, for every follower, in floats from above."""
-        drift = (self.after if after else self.drift) or 0
-        return self.witness.u * float(self.initial * self.left + self.floor + drift) * MORE + LEAST
+        most = self.initial * self.left + self.floor + ((self.after if after else self.drift) or 0)
+        return self.witness.u * float(most) * MORE + (LEAST if most else 0)
 
     def decay(self, case: LateCase, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return ``e^(-b s_c)``, and what leaders that move and disturbances add in the bracket, (M,) floats each.
@@ -97,10 +97,9 @@ class RowBound:
         cap, u, b = case.messages.gain_cap, self.witness.u, float_up(self.witness.b)
         assert cap is not None
         y = float_up(self.initial * case.highest(self.witness.b, self.cap))
-        wrong = (
-            float_up(cap * self.highest_floor(case)) * rows.largest(u) + float_up(cap * case.exact.wrong) * rows.weights
-        )
-        return ((2 * rows.weights - b * (1 - 1e-15)) * u * y + wrong) * MORE + LEAST
+        floor, error = (float_up(cap * x) for x in (self.highest_floor(case), case.exact.wrong))
+        wrong = floor * rows.largest(u) + error * rows.weights
+        return ((2 * rows.weights - b * (1 - 1e-15)) * u * y + wrong) * MORE + (LEAST if y or floor or error else 0)
 
 
 def away(case: LateCase, rows: FollowerRows) -> np.ndarray:

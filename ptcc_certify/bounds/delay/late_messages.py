@@ -163,7 +163,8 @@ class LateBounds:
 
     def __repr__(self) -> str:
         size = up(self.largest, 2) if self.largest else "0"
-        within = "nothing" if math.isinf(self.largest) else f"every agent within {size}"
+        whose = ("agent", "final state") if self.leaders is None else ("follower", "target")
+        within = "nothing" if math.isinf(self.largest) else f"every {whose[0]} within {size} of its {whose[1]}"
         return f"LateBounds({self.messages!r}: {within} at T)"
 
     @property
@@ -195,7 +196,37 @@ class LateBounds:
     @property
     def inputs(self) -> np.ndarray | None:
         """What bounds ``|u_k|`` up to ``T``, of vehicles theirs, the sliding term left out; None where nothing does."""
-        return self.input if self.vehicles is None else self.vehicles.input
+        if self.vehicles is not None:
+            return self.vehicles.input
+        return self._inputs_heard_right if self.input is None else self.input
+
+    @property
+    def heard_right(self) -> bool:
+        """Whether followers hear what is so, however late: nobody moves, or they hear of leaders at rest alone."""
+        bounds = [row.initial + row.highest_floor(self.case) for row in self.rows]
+        return self.vehicles is None and (self.direct or not all(bounds or [True]))
+
+    @cached_property
+    def _inputs_heard_right(self) -> np.ndarray | None:
+        """Bound ``|u_k|`` where followers hear what is so; None where they do not, or nothing is proved.
+
+        It is 0 where nobody moves. Followers of leaders alone are off by ``e^(-D_k s)`` of what they are at first, and
+        ``gain e^(-D_k s)`` is largest at first if ``D_k rho2 kappa >= 1``.
+        """
+        if not self.heard_right:
+            return None
+        bound = np.zeros(len(self.labels))
+        if not self.direct:
+            return bound
+        rows, pole = late_rows(self.case), self.case.protocol.gain.pole
+        doubtful = rows.followers[rows.D * float(pole) < 1 + 1e-9].tolist()
+        degrees = (row[v] for v, row in zip(doubtful, self.case.graph.exact_rows(doubtful), strict=True))
+        if not self.rows or any(degree * pole < 1 for degree in degrees):
+            return None
+        first = float_up(self.case.exact.least_gain())
+        off = np.minimum.reduce([row.witness.u * float_up(row.initial) for row in self.rows])
+        bound[self.followers] = first * rows.weights * off * MORE
+        return bound
 
     @property
     def tracking_protocol(self) -> TrackingProtocol | None:

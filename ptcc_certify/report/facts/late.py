@@ -41,7 +41,7 @@ def late_facts(certificate: Certificate) -> Facts:
     told = [*_impossible(late), *([] if late.direct else _left(late)), *_stages(late), *_kept_off(late)]
     if (at := certificate.at) is not None and (late.of_followers or late.of_all):
         bound = float(late.largest_bound([float(at)])[0])
-        note = f"at t = {near(at)} every agent within {up(bound, 2)}"
+        note = f"at t = {near(at)} every agent within {_bound_text(late, bound, 2)}"
         told.append(Fact(head="late", value=bound, side="up", note=note))
     yield from (replace(fact, loud=not late.says_something) for fact in told)
     from ptcc_certify.certificate.judgements import largest_late_input  # ``classify`` has no use for solvers
@@ -50,18 +50,29 @@ def late_facts(certificate: Certificate) -> Facts:
     if largest is not None:
         sliding = "" if certificate.protocol.reaching is None else ", the sliding term included"
         speed = None if late.vehicles is None or late.vehicles.velocity is None else late.vehicles.velocity.max()
-        also = "" if speed is None else f", |v_k| <= {up(float(speed), 4)}"
+        also = "" if speed is None else f", |v_k| <= {_bound_text(late, float(speed), 4)}"
         text = f"bounded up to T; |u_k| <= {up(largest, 4)}{also}{sliding}{whole}"
         yield Fact(head="input", value=largest, side="up", note=text)
     else:
-        text = "not proved bounded with late messages"
-        if late.vehicles is not None:
-            text = "not proved bounded yet of virtual positions without a cap of the gain"
-        elif late.messages.gain_cap is None:
-            text += ": a gain without a cap makes ever more of what is late"
-        yield Fact(head="input", standing="unproved", note=text, loud=True)
+        yield Fact(head="input", standing="unproved", note=_unbounded_text(late), loud=True)
     if by_agent := _residual_text(late):
         yield Fact(head="left", note=f"at T by agent: {by_agent}", detail=True)
+
+
+def _unbounded_text(late: LateBounds) -> str:
+    """Tell that no bound of the input is proved, and why."""
+    if late.vehicles is not None:
+        return "not proved bounded yet of virtual positions without a cap of the gain"
+    if late.heard_right:
+        return "not proved bounded: not all who listen have rho2 kappa times their weights >= 1"
+    kind = "late" if late.messages.age else "rounded"
+    why = "" if late.messages.gain_cap is not None else f": a gain without a cap makes ever more of what is {kind}"
+    return f"not proved bounded with {kind} messages{why}"
+
+
+def _bound_text(late: LateBounds, bound: float, digits: int) -> str:
+    """Write a bound with up to so many digits, from above: 0 only where nothing is off at first, either."""
+    return up(bound, digits) if bound or late.largest_bound([0.0]).any() else "0"
 
 
 def _vehicles(late: LateBounds) -> Facts:
@@ -80,7 +91,7 @@ def _vehicles(late: LateBounds) -> Facts:
     whole = FROM_WITHIN_1 if late.relative else ""
     for name, bounds in (("deviations", position), ("velocities", velocity)):
         largest = zip(bounds.max(axis=0).tolist(), shares, strict=True)
-        each = ", ".join(f"{up(x, 2)} at {share:g} T" for x, share in largest)
+        each = ", ".join(f"{_bound_text(late, x, 2)} at {share:g} T" for x, share in largest)
         yield Fact(head="agents", note=f"{name} at most {each}{whole}", detail=True)
 
 
@@ -199,7 +210,8 @@ def _threshold(late: LateBounds) -> float:
 
 def _left(late: LateBounds) -> Facts:
     """Tell what is left at T at most, and which delays are certified."""
-    cap = "under a cap nothing settles: " if late.messages.gain_cap is not None and late.leaders is None else ""
+    capped = late.messages.gain_cap is not None and late.leaders is None and late.largest > 0
+    cap = "under a cap nothing settles: " if capped else ""
     limit = _limit_text(late)
     if math.isinf(late.largest):
         note = f"{cap}nothing is proved of what is left at T"
@@ -218,7 +230,7 @@ def _within_text(late: LateBounds, digits: int) -> str:
 
     Agents move continuously: a bound that holds after T holds at T, too.
     """
-    if late.vehicles is not None and not late.largest:
+    if not late.largest:
         return f"every {'agent exactly at its final state' if late.leaders is None else 'follower on its target'} at T"
     text = f"every agent within {up(late.largest, digits)} of its final state at T"
     if late.leaders is not None:

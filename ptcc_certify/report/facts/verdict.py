@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from operator import add
 from typing import TYPE_CHECKING
 
 from lmi.exact.decimal_rounding import near
@@ -15,6 +18,7 @@ from ptcc_certify.report.text_layout import arithmetic
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
+    from ptcc_certify.checker.input_formulas import InitialSet
     from ptcc_certify.model.base import Protocol
 
 #: Notes that are told.
@@ -46,11 +50,17 @@ def _beginning(certificate: Certificate, origins: Mapping[str, str]) -> list[str
     if (v0 := certificate.proof.velocities) is not None:
         begin.append(f"v(0) {origins.get('v(0)', 'given' if any(v0) else '0')}")
     if certificate.initial_set is not None and (not begin or certificate.only_drawn):
-        begin = [initial_states_text(certificate.initial_set)]
+        begin = [initial_states_text(_set_of_positions(certificate.initial_set, certificate.proof.offsets))]
     begin += ["in a formation"] if certificate.proof.offsets is not None else []
     if certificate.sigma0 is not None:
         begin += ["sigma(0) 0" if certificate.direct else f"sigma(0) {origins.get('sigma(0)', 'given')}"]
     return begin
+
+
+def _set_of_positions(initial_set: InitialSet, places: Sequence[Fraction] | None) -> InitialSet:
+    """Return the set of ``x(0)``, where that which is kept is of ``x(0)`` less the places in a formation."""
+    center = initial_set.center
+    return initial_set if places is None else replace(initial_set, center=tuple(map(add, center, places)))
 
 
 def run_facts(certificate: Certificate) -> Facts:

@@ -25,8 +25,14 @@ _DECAY_AXES = {"left": "remaining time, $1 - t/T$", "time": "time $t$", "clock":
 _BELOW_FLOOR = 1e-2
 #: 1 - t/T down to which bounds are drawn where there is no run, and how many instants.
 _LAST, _INSTANTS = 1e-8, 401
+#: What is told where there is nothing to draw.
+_NONE = "nothing decays: every agent begins where it ends, or nearer to it than a run tells; draw its states"
 #: The name of the best bound among those of the Lyapunov functions.
 _BEST = "best"
+
+
+class NothingDecays(ParameterError):
+    """Agents begin where they end, as far as a run tells, and the bound says so, too: nothing is to be drawn."""
 
 
 @styled
@@ -101,9 +107,11 @@ def plot_decay(
     norm, floor, unit = error_norm(subject if run is None else run, proved)
     bounds = {} if proved is None else _bounds(proved, remaining, unit, each)
     best = bounds.get(_BEST, (np.full(remaining.size, np.inf), {}))[0]
-    scale = float(norm[0]) or (float(best[0]) if bounds else 0.0) or (0.0 if run is None else float(norm.max()))
-    if scale == 0:
-        raise ParameterError("the agents begin where they end: nothing decays")
+    bounded = bool(bounds) and bool((best > _BELOW_FLOOR * floor).any())
+    seen = np.full(norm.size, np.nan) if run is None else resolved(norm, best, floor)
+    if not bounded and not np.isfinite(seen).any():
+        raise NothingDecays(_NONE)
+    scale = float(norm[0] if norm[0] > floor else 0) or (float(best[0]) if bounds else 0.0) or float(norm.max())
     place = _places(subject.protocol.gain, run, remaining)[axis]
     ax = axes_of(ax)
     for values, style in bounds.values():
@@ -112,7 +120,6 @@ def plot_decay(
     top = float(max(scale, best[np.isfinite(best)].max(initial=0.0)))
     if run is not None and norm.any():
         bottom = max(_BELOW_FLOOR * floor, min(float(norm.min()), bottom) / 3)
-        seen = resolved(norm, best, floor)
         _draw_run(ax, place, seen / scale, floor / scale, bottom / scale, "" if asked is None else ideal_text(subject))
         last = int(np.flatnonzero(((best if bounds else norm) >= bottom) | (seen > best))[-1])
         top = max(top, float(np.nan_to_num(seen).max()))  # a violated bound stays in sight
@@ -142,7 +149,7 @@ def _draw_signals(ax: Axes, certificate: Certificate, runs: Sequence[Trajectory]
     place = {"left": first.remaining, "time": first.t, "clock": first.clock}[axis][before]
     floor = FLOOR_FACTOR * first.rtol * (float(np.abs(first.states[:, 0]).max()) or 1.0)
     if not (bound >= floor).any():
-        raise ParameterError("every agent begins where it ends: there is no decay to draw")
+        raise NothingDecays(_NONE)
     own = certificate.family_proof.signal == "any" or keeps_promise(certificate, runs)
     names = {False: "random signals" if own else "any signal (random)", True: "worst cases found"}
     known = _known_end(certificate)
