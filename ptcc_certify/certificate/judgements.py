@@ -202,7 +202,7 @@ def at_deadline(proof: GraphProof | FamilyProof, answer: Answer) -> Answer:
     what = f"{answer.what} at T with {proof.asked_messages.name}"
     if late is None:
         return Answer(OPEN, what, "nothing is proved of them")
-    if late.direct or (late.vehicles is not None and not late.largest):
+    if late.direct or not late.largest:
         return answer
     if late.missed is not None:
         return Answer(REFUTED, what, _misses(late, late.missed))
