@@ -203,3 +203,10 @@ def test_messages_that_are_rounded_are_not_called_late():
 def test_rates_of_the_plain_protocol_are_not_those_of_agents_of_order_1_with_gains_of_their_own():
     certificate = asked(agents=ptcc.Agents(order=1, decay=2))
     assert told(certificate, "rate")[0].startswith("of the plain protocol: 2.763")
+
+
+def test_a_family_that_begins_where_it_ends_stays_exactly_there():
+    unsure = ptcc.Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 2)])
+    certificate = ptcc.certify(unsure, ptcc.NominalProtocol(), [1, 1], asks=ptcc.Asks(simulation=False))
+    assert told(certificate, "error")[0].startswith("at 0.99 T: every agent within 0 of its final state")
+    assert not certificate.proof.deviation_bound([1.0, 0.5, 0.0]).any()

@@ -48,7 +48,9 @@ class UndrivenPart:
     ends: Sequence[Interval] | None = None
 
     def deviation(self, clock: np.ndarray) -> np.ndarray:
-        """Bound ``|x_k(t) - x_k(T)|`` at instants of the clock, (N, M)."""
+        """Bound ``|x_k(t) - x_k(T)|`` at instants of the clock, (N, M): 0 where all begin where they end, at rest."""
+        if self.ends is not None and all(x == low == high for x, (low, high) in zip(self.x, self.ends, strict=True)):
+            return np.zeros((len(self.x), clock.size))
         bounds, finite = self._by_functions(clock), np.isfinite(clock)
         rate = max((float(one.function.rate) for one in self.functions), default=0.0)
         if self.rows is not None and self.ends is not None and rate > 0 and finite.any():

@@ -151,7 +151,7 @@ def _ideal_error(certificate: Certificate) -> Iterator[tuple[Fraction | float, s
 
 def _at_instants(values: Iterable[float], names: Iterable[str]) -> str:
     """List bounds at instants, rounded up."""
-    return ", ".join(f"{up(float(x), 2)} at {name}" for x, name in zip(values, names, strict=True))
+    return ", ".join(f"{up(float(x), 2) if x else 0} at {name}" for x, name in zip(values, names, strict=True))
 
 
 def instants_facts(certificate: Certificate) -> Facts:
@@ -316,6 +316,6 @@ def _family_error(
     worst = float(bound([left]).max())
     whose = "" if again else " of its final state"
     standing: Standing = "proved" if certificate.direct else "unproved"
-    text = f"at {when}: every agent within {up(worst, 2)}{whose}{of}"
+    text = f"at {when}: every agent within {up(worst, 2) if worst else 0}{whose}{of}"
     yield Fact(head="error", value=worst, side="up", standing=standing, note=text)
     yield _deviation_fact(certificate, bound, of)
