@@ -74,11 +74,13 @@ def _judge_behaviour(proof: GraphProof, expected: str) -> Answer:
     answer, part = judge_behaviour(proof.structure, expected), proof.agents
     if part is None:
         answer = replace(answer, what=expected if proof.offsets is None else f"{expected} of x - offsets")
-        still = proof.constant or (proof.at_rest and proof.noise is None)
-        if still or proof.asked_messages is not None or not (proof.limits or proof.noise):
+        disturbed = proof.delta is not None and bool(proof.limits) and proof.protocol.reaching is None
+        asked = {"limits of the gain": bool(proof.limits) and not proof.at_rest, "noise": proof.noise is not None}
+        left = [what for what, there in (asked | {"disturbances": disturbed}).items() if there]
+        if proof.constant or proof.asked_messages is not None or not left:
             return answer
-        what = "limits of the gain leave" if proof.limits else "noise leaves"
-        return replace(answer, status=OPEN, why=f"{what} something at T")
+        leave = "leaves" if left == ["noise"] else "leave"
+        return replace(answer, status=OPEN, why=f"{' and '.join(left)} {leave} something at T")
     what = f"{expected} of x - offsets" if part.formation else expected
     if part.settles:
         return replace(answer, what=what)
@@ -202,7 +204,8 @@ def at_deadline(proof: GraphProof | FamilyProof, answer: Answer) -> Answer:
     what = f"{answer.what} at T with {proof.asked_messages.name}"
     if late is None:
         return Answer(OPEN, what, "nothing is proved of them")
-    if late.direct or not late.largest:
+    rest = isinstance(proof, GraphProof) and proof.at_rest and not proof.leaders_move
+    if not late.largest or (rest and not late.messages.value_error and late.vehicles is None):
         return answer
     if late.missed is not None:
         return Answer(REFUTED, what, _misses(late, late.missed))
@@ -310,6 +313,8 @@ def _judge_late_input(proof: GraphProof | FamilyProof, late: LateBounds, most: F
         why = "no bound is proved with late messages"
         if late.messages.vehicles is not None:
             why = "no bound is proved of virtual positions without a cap"
+        elif late.heard_right:
+            why = "not all who listen have rho2 kappa times their weights >= 1"
         elif late.messages.gain_cap is None:
             why += "; a gain without a cap makes ever more of what is left at T"
         return Answer(OPEN, what, why)

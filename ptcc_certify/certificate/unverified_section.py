@@ -198,7 +198,7 @@ def write_unverified(certificate: Evidence) -> dict[str, Any]:
         bounds = [(part.component, part.upper_bound) for part in proof.parts]
         return {
             "upper_bounds": [None if b is None else upper_bound_entry(Quotient.of(c), b) for c, b in bounds],
-            "asked": {"behaviour": proof.expectations.behaviour} | write_unproved(proof) | _write_signals(proof),
+            "asked": _write_request(proof.request) | write_unproved(proof) | _write_signals(proof),
             "read": dict(proof.family.read) or None,
             **{"origins": origins, "scenario": scenario, "notes": notes},
         }

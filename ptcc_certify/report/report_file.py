@@ -8,7 +8,7 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from ptcc_certify.certificate.assessment import CERTIFIED, OPEN
+from ptcc_certify.certificate.assessment import CERTIFIED, OPEN, REFUTED
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.certificate_file import RejectedCertificate
 from ptcc_certify.certificate.checking import refuse_no_certificate
@@ -61,7 +61,7 @@ def write_report(
     Returns
     -------
     str
-        ``certified``, ``undecided`` or ``rejected``; ``left open`` where that is what became of signals asked for.
+        ``certified``, ``undecided`` or ``rejected``; ``left open`` or ``refuted`` if that became of what was asked.
 
     Raises
     ------
@@ -113,7 +113,8 @@ def write_report(
         _write_statement(path, draw(saved, ("graph", "decay"), runs), lambda names: report_latex(saved, names))
     else:
         write_atomically(path, report_html(saved, runs=runs, no_run=why, day=day))
-    return OPEN if saved.verdict == CERTIFIED and saved.assessment.asked == OPEN else saved.verdict
+    asked = saved.assessment.asked
+    return asked if saved.verdict == CERTIFIED and asked in (OPEN, REFUTED) else saved.verdict
 
 
 def _read(certificate: Any, memory: float) -> Certificate:

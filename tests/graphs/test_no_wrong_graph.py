@@ -837,6 +837,40 @@ WORDS_OR_TITLES = [
     Input("g.txt", "# prose\n" * 300 + "# target source weight\n1 2 3\n2 3 -1\n", says=("--columns 2,1,3",)),
     *(Input("g.txt", f"# {line}\n1 2 3\n2 3 -1\n", says=("--undirected",)) for line in SAYS_UNDIRECTED.split("|")),
     *(Input("g.txt", f"# {line}\n1 2 3\n2 3 -1\n", "1>2=3 2>3=-1") for line in SAYS_NOTHING.split("|")),
+    *(
+        Input("g.txt", f"# {line}\n1 2 3\n2 3 -1\n", says=("--undirected",))
+        for line in ("directed=False, weighted=True", "Undirected graph has 34 nodes", "Directed: No (each pair once)")
+    ),
+    *(
+        Input("g.txt", f"# {line}\n1 2 3\n2 3 -1\n", "1>2=3 2>3=-1")
+        for line in (
+            *(
+                "undirected=False, weighted=True",
+                "undirected edges: 0",
+                "If the graph is undirected, list each edge twice.",
+            ),
+            *("Downloaded from https://snap.stanford.edu/data/soc-sign-epinions.html", "exported from weights.csv"),
+            *("Data from BitcoinTrust", "to measure influence"),
+        )
+    ),
+    Input("g.csv", "# target,source,weight\ra,b,1\rb,c,-1\r", says=("--columns 2,1,3",)),
+    Input("g.csv", "# edge list: (target, source, weight)\na,b,1\nb,c,-1\n", says=("--columns 2,1,3",)),
+    Input("g.txt", "HDAC1 HDAC2 Repression\nTP53 MDM2 Activation\n", "HDAC1>HDAC2=-1 TP53>MDM2=1"),
+    Input("g.txt", "21 22 activation\n3 4 inhibition\n", "21>22=1 3>4=-1"),
+    *(
+        Input("g.txt", f"{first}\n1 2 1\n2 3 -1\n3 1 1\n", says=("line 1", "text, or an edge?"))
+        for first in ("n = 3", "nodes : 3", "number nodes 3")
+    ),
+    Input("g.txt", "1 2 1\n2 3 -1\n3 1 1\nTotal edges: 2\n", says=("line 4", "text, or an edge?")),
+    Input("g.csv", "0,1,2\nAnn,Bob,1\nBob,Cat,-1\n", says=("line 1", "text, or an edge?")),
+    Input("g.csv", "0,1,2\n0,1,0\n0,0,-1\n1,0,0\n", says=("line 1", "above a matrix")),
+    *(
+        Input("g.csv", f"{header}\n1,a,b,1\n2,b,c,-1\n", says=("line 1", "--columns"))
+        for header in ("wave,sender,receiver,weight", "week,i,j,rating", "period,ego,alter,weight")
+    ),
+    Input("g.csv", "TF,target,effect,source\na,b,1,RegulonDB\nb,c,-1,x\n", says=("who is heard, TF or source?",)),
+    Input("g.csv", "TF,study,gene,effect\na,s1,b,1\nb,s2,c,-1\n", says=("line 1", "--columns")),
+    Input("g.csv", "# target,source,weight,sign\na,b,1,1\nb,c,2,-1\n", says=("remove # before target",)),
     Input("g.txt", MIRRORED, says=("--undirected --duplicates last",)),
     Input("g.txt", MIRRORED, "1>2=3 2>1=3 2>3=-1 3>2=-1", how={"undirected": True, "duplicates": "last"}),
     *(
@@ -1191,6 +1225,14 @@ def test_all_that_is_wrong_with_delays_is_one_message(tmp_path):
     said = str(told.value)
     assert 'line 2: delay "0,5" of edge a -> b is not a number (write decimals with a point)' in said
     assert "line 3: delay -1 of edge b -> c is negative (2 in all) (give a number >= 0); mend these" in said
+
+
+@pytest.mark.parametrize(
+    "line", ["friends (undirected)", "Edges are undirected", "nodes=3, directed=False", "symmetric", "reversed by me"]
+)
+def test_comments_on_directions_that_are_not_understood_are_told(tmp_path, line):
+    graph = read_graph(put(tmp_path, "g.txt", f"# {line}\n1 2 3\n2 3 -1\n"))
+    assert graph.read["notes"] == (f"ignored as a comment: # {line}",)
 
 
 def test_names_of_a_matrix_that_are_not_read_are_told(tmp_path):

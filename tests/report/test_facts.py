@@ -210,3 +210,30 @@ def test_a_family_that_begins_where_it_ends_stays_exactly_there():
     certificate = ptcc.certify(unsure, ptcc.NominalProtocol(), [1, 1], asks=ptcc.Asks(simulation=False))
     assert told(certificate, "error")[0].startswith("at 0.99 T: every agent within 0 of its final state")
     assert not certificate.proof.deviation_bound([1.0, 0.5, 0.0]).any()
+
+
+def test_disturbances_under_a_cap_leave_a_behaviour_open_and_each_cause_is_named():
+    cap, of = ptcc.GainLimits(gain_cap=20), ptcc.Expectations("bipartite consensus")
+    ends = ["0.3", "0.3", "-0.3"]
+    for x0, words, left in (
+        (ends, {"delta": "0.1"}, "disturbances leave"),
+        (ends, {"noise": "0.1"}, "noise leaves"),
+        ([1, 2, 3], {"noise": "0.1"}, "limits of the gain and noise leave"),
+    ):
+        assert f"({left} something at T)" in told(asked(x0, limits=cap, expectations=of, **words), "verdict")[0]
+
+
+def test_what_is_asked_of_a_family_stands_in_its_file(tmp_path: Path):
+    unsure = ptcc.Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 2)])
+    asks = ptcc.Asks(simulation=False, expectations=ptcc.Expectations(max_input=1))
+    made = ptcc.certify(unsure, ptcc.NominalProtocol(), [1, 3], asks=asks)
+    made.save(tmp_path / "c.json")
+    assert told(ptcc.read_certificate(tmp_path / "c.json"), "verdict") == told(made, "verdict")
+    assert told(made, "verdict")[0].startswith("refuted: |u_k| <= 1 ")
+    assert ptcc.write_report(tmp_path / "c.json", tmp_path / "c.html") == "refuted"
+
+
+def test_followers_of_leaders_alone_are_exactly_at_their_ends_however_late():
+    star, law, asks = [("l", "a", 1), ("l", "b", -1)], ptcc.NominalProtocol(), ptcc.Asks(simulation=False)
+    certificate = ptcc.certify(star, law, [1, 3, 2], messages=ptcc.LateMessages("0.1"), asks=asks)
+    assert certificate.late.largest == 0 and not told(certificate, "left")

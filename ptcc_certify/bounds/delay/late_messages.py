@@ -152,6 +152,8 @@ class LateBounds:
         """What bounds ``|x_k(T) - x_k*|``, of vehicles theirs, by one proof after the other: (N,) arrays."""
         if self.vehicles is not None:
             return [self.vehicles.position]
+        if self.direct:
+            return [np.zeros(len(self.labels))]
         found = [self.residual, None if self.settling is None else self.settling.residual]
         whole = (np.array([float_up(x) for x in one.residual]) for one in (self.form, self.lmi) if one is not None)
         return [*(one for one in found if one is not None), *whole]
@@ -269,7 +271,8 @@ class LateBounds:
         least = np.full((self.followers.size, t.size), np.inf)
         bounds = [one.deviation_bound(self.case, t) for one in self.of_followers]
         bounds += [one.deviation_bound(self.case, t)[self.followers] for one in self.of_all]
-        return np.asarray(np.minimum.reduce([least, *bounds]))
+        settled = self.direct & (t > float(self.case.protocol.T))
+        return np.where(settled, 0.0, np.minimum.reduce([least, *bounds]))
 
     def largest_bound(self, t: Sequence[float] | np.ndarray) -> np.ndarray:
         """Return what bounds the largest of these of all agents, ``(M,)`` floats, as :meth:`deviation_bound` does."""

@@ -6,7 +6,7 @@ import csv
 import re
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
-from itertools import chain, islice
+from itertools import chain, islice, product
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from ptcc_certify.graphs.io.columns_beside import Column
 from ptcc_certify.graphs.io.files import lines_of
 from ptcc_certify.graphs.io.problems import Problem, Problems, one_message
 from ptcc_certify.graphs.io.raw_edges import DECIMALS, HEADER_MEND, Beside, Draft, Numbers, Rows, Signs
-from ptcc_certify.graphs.io.signs import WEIGHT, plain, sign_of_word
+from ptcc_certify.graphs.io.signs import WEIGHT, plain, sign_of_word, weight_and_sign
 from ptcc_certify.graphs.io.table_columns import Columns, asks_of_corner, columns_of, columns_of_comment, names_edges
 from ptcc_certify.graphs.io.text_matrices import bracketed_matrix, is_entry, table_as_matrix
 from ptcc_certify.graphs.labels import first_five, ordered_labels
@@ -30,13 +30,19 @@ _SEPARATORS = ("\t", ",", ";", None)  # None: blanks
 _LOOKED_AT, _EXTRA, _SIGN_AT = 20, 10**5, {"first": "2,3,1", "second": "1,3,2"}
 #: From this number on a number after the third column is taken for a year or a time.
 _TIMES = 1900
-#: What comments say of undirected edges: of a graph that is, as a value, or of a directed one that it is none.
-_NO_VALUE = r"\s*[:=]\s*(false|no?|0)[\s.;,]*$"
+#: What comments say of undirected edges: that the graph is, or that it is no directed one; others are told as comments.
+_NO = r"\s*[:=?]\s*(false|no?|0|none|n/a)(?=\s*($|[.;,|(]|\w+\s*[:=]|-\s))"
 _UNDIRECTED = re.compile(
-    rf"^[\s#%]*undirected\b(?!{_NO_VALUE}|\s+(false|no)\s*$|\s+\w+\s+(was|were|have|has|had)\b)"
-    r"|[:=]\s*undirected[\s.;,]*$|^[\s#%]*(weighted|signed),?\s+undirected\b"
-    r"|\b(this|it|graph|network) is (an )?undirected\b"
-    rf"|^[\s#%]*(is[\s_]?)?directed( graph| network)?({_NO_VALUE}|\s+false\s*$)",
+    rf"^[\s#%]*(undirected\b(?!{_NO}|\s+(false|no)\s*$|\s+\w+\s*:\s*0|\s+\w+\s+((has|have) been|was|were)\s+\w+ed\b)"
+    r"|(weighted|signed),?\s+undirected\b|(this|it|(this|the) (graph|network)) is (an )?undirected\b"
+    rf"|(is[\s_]?)?directed( graph| network)?({_NO}|\s+false\s*$))|^[\s#%]*[\w ]*[:=]\s*undirected[\s.;,]*$",
+    re.IGNORECASE,
+)
+#: What comments say of directions in other words.
+_OF_DIRECTIONS = re.compile(
+    r"undirected|symmetric|\bnot directed|\bdirected\s*[:=]|revers|"
+    r"\b(source|from|sender|src|tf|regulator)\b.*\b(target|to|receiver|dst|gene)\b|"
+    r"\b(target|to|receiver|dst|gene)\b.*\b(source|from|sender|src|tf|regulator)\b|\blisten",
     re.IGNORECASE,
 )
 #: From this number on whole weights throughout are taken for seconds since 1970.
@@ -137,7 +143,7 @@ def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
     draft = EdgeList(name, columns, started)
     draft.read(chain(begin, numbered))
     rows = draft.rows()
-    rows.notes += notes_on_comments(data)
+    rows.notes += notes_on_comments(data) or _note_on_directions(data, undirected, len(table[0]) if table else 0)
     if rows.problems and not columns.titles:  # of which the other rules say nothing
         place, message = one_message(rows.problems, " ".join)
         raise FormatError(f"{', '.join(filter(None, (name, place)))}: {message}")
@@ -175,6 +181,23 @@ def _note_on_names(data: bytes, n: int) -> tuple[str, ...]:
     for line in islice((line.strip() for line in data[:10000].decode("utf-8", "replace").splitlines()), n):
         if line[:1] in ("#", "%") and len(re.findall(r"[^\s,;#%]+", line)) == n:
             return (f"ignored as a comment: {shorten(line)}; names are a first row",)
+    return ()
+
+
+def _note_on_directions(data: bytes, understood: str, width: int) -> tuple[str, ...]:
+    r"""Note a comment above the rows that speaks of directions in words which are not understood here.
+
+    Examples
+    --------
+    >>> _note_on_directions(b"# friends (undirected)\na,b,1\n", "", 3)
+    ('ignored as a comment: # friends (undirected)',)
+    >>> _note_on_directions(b"# source,target,weight\na,b,1\n", "", 3)
+    ()
+    """
+    for line in comments_above(data):
+        titles = any(names_edges(titles) for titles, _ in _titles_of(line, width))
+        if not understood and not titles and _OF_DIRECTIONS.search(line):
+            return (f"ignored as a comment: {shorten(line.strip())}",)
     return ()
 
 
@@ -310,18 +333,34 @@ def _refuse_titles(row: list[str], place: str, data: bytes) -> None:
 def _refuse_titles_of_comments(data: bytes, name: str, width: int) -> None:
     """Refuse rows without a header whose columns a comment names in another order, as numpy.savetxt writes it.
 
-    It has as many titles as rows have fields, between commas, semicolons or tabs, or between blanks and any of these;
-    what stands before a colon is none of them.
+    It has as many titles as rows have fields, see :func:`_titles_of`.
     """
     for line in comments_above(data):
-        text = re.sub(r"^[\s#%]*(\w+\s*:)?\s*", "", line).rstrip()
-        for separator in (",", ";", r"\t", r"[,;\t ]"):
-            titles = [title.strip(" \"'") for title in re.split(rf"\s*{separator}\s*(?![^(]*\))", text)]
-            if len(titles) != width or len(set(map(plain, titles))) < width:
-                continue
-            if columns := columns_of_comment(titles, name):
-                mend = f"remove {line.strip()[0]} before {shorten(titles[0])}, or tell them: --columns {columns}"
+        for titles, prose in _titles_of(line, width):
+            if columns := columns_of_comment(titles, name, prose):
+                mend = f"remove {line.strip()[0]} before {shorten(titles[0])}"
+                if None in weight_and_sign(titles, name):
+                    mend += f", or tell them: --columns {columns}"
                 raise FormatError(f"{name}: a comment names the columns; {mend}")
+
+
+def _titles_of(line: str, width: int) -> Iterator[tuple[list[str], bool]]:
+    r"""Yield so many titles of a comment, between commas, semicolons or tabs, or between blanks and any of these.
+
+    What stands before a colon or around brackets is none of them. The second item tells that it may be prose.
+
+    Examples
+    --------
+    >>> [titles for titles, _ in _titles_of("# Columns (to, from, weight)", 3)][0]
+    ['to', 'from', 'weight']
+    """
+    text = re.sub(r"^[\s#%]*([\w ]*:)?\s*", "", line).rstrip()
+    inner = re.fullmatch(r"[\w ]*\(([^()]*)\)", text)
+    separators = (",", ";", r"\t", r"[,;\t ]")
+    for told, separator in product([text] if inner is None else [inner[1], text], separators):
+        titles = [title.strip(" \"'") for title in re.split(rf"\s*{separator}\s*(?![^(]*\))", told)]
+        if len(titles) == width == len(set(map(plain, titles))) and not re.search("[./:]", "".join(titles)):
+            yield titles, len(separator) > 2
 
 
 def comments_above(data: bytes) -> Iterator[str]:
@@ -334,7 +373,8 @@ def comments_above(data: bytes) -> Iterator[str]:
     """
     begins, text = 0, data.removeprefix(b"\xef\xbb\xbf")
     while begins < len(text):
-        ends = text.find(b"\n", begins) + 1 or len(text)
+        found = re.compile(rb"\r\n|\r|\n").search(text, begins)
+        ends = found.end() if found else len(text)
         line = text[begins:ends].decode("utf-8", "replace").rstrip("\r\n")
         if line.strip()[:1] not in "#%":
             return
@@ -348,12 +388,13 @@ def _refuse_ambiguous(draft: EdgeList, rows: Rows, data: bytes, konect: bool) ->
     ``konect``: its first line, as KONECT writes it, tells that the fourth column holds times.
     """
     name, labels, weights = draft.name, draft.nodes.texts, draft.weights.texts
-    tell = "begin with a header source,target,weight, or tell the columns: --columns 1,2,3"
+    tell = "begin with a header source,target,weight, or tell these columns, such as --columns 1,2,3"
     commas = [label for label in labels if re.fullmatch(r"[+-]?\d+,\d+", label)]
     if commas and b'"' not in data:
         which = "nodes, or a matrix, with decimal commas? Write decimals with a point, or quote the names of nodes"
         raise FormatError(f"{name}: {commas[0]} among {which}")
     _refuse_printed(draft)
+    _refuse_text(draft)
     alone = bool(draft.first) and 0 not in draft.first and 0 not in draft.second  # the first node
     if alone and rows.labels[0] in (str(len(labels) - 1), str(len(draft.first))):
         what = f"{rows.labels[0]} is the number of nodes or edges, or a node without edges? Leave the first row out"
@@ -395,6 +436,21 @@ def _refuse_printed(draft: EdgeList) -> None:
     if draft.first and draft.declared and every and all(text in draft.nodes.texts for text in draft.weights.texts):
         mend = "Write those with networkx.write_weighted_edgelist; of edges, begin with a header source,target,weight"
         raise FormatError(f"{draft.name}: lists of neighbours, one of every node, or edges and nodes alone? {mend}")
+
+
+def _refuse_text(draft: EdgeList) -> None:
+    """Refuse a first or last row that is text, such as ``n = 3``, or numbers of columns: no other row has its ends."""
+    first, second, labels = np.asarray(draft.first), np.asarray(draft.second), [*draft.nodes.texts]
+    for k in {0, len(first) - 1} if len(first) > 1 else ():
+        ends = [int(first[k]), int(second[k])]
+        if np.count_nonzero(np.isin(first, ends) | np.isin(second, ends)) > 1:
+            continue
+        names, weight = [labels[v] for v in ends], [*draft.weights.texts][draft.codes[k]]
+        numbers = all(text.isdigit() for v, text in enumerate(labels) if v not in ends)
+        if (numbers and not any(text.isdigit() for text in names)) or (k == 0 and (*names, weight) == ("0", "1", "2")):
+            what = f"{shorten(names[0])} and {shorten(names[1])} are in no other row: text, or an edge?"
+            mend = "Leave this row out, or begin with a header source,target,weight"
+            raise FormatError(f"{draft.name}, line {draft.lines[k]}: {what} {mend}")
 
 
 def _counts(draft: EdgeList) -> bool:

@@ -32,6 +32,8 @@ _HEARD = r"listens|hears|speaker|heard|followee|followed|rated|trustee|trusted|s
 _REST = r"(node|vertex|gene|protein|agent|id|name|label|index)*"
 _STARTS = (rf"(source|src|from){_REST}", rf"(start|origin|orig|tf|transcriptionfactor|regulator|influencer){_REST}")
 _ENDS = (rf"(target|tgt|dst|to){_REST}", rf"(end|dest|destination|influenced|regulated){_REST}")
+#: Who may be at either end.
+_SOMEBODY = r"(user|person|people|actor|member|country|state|player|character)s?"
 #: Titles of times; of what is no node, and of what is no weight.
 _TIME = r"(?!.*(candid|mand)ate).*(time|date|year|stamp)"
 _NO_END = rf"|\W*|\d+|no|nr|id|idx|index|row|key|x|unnamed.*|(edge|link|row)(id|nr|no)?|{_TIME}|.*(?<!ac)(?<!vis)count"
@@ -150,6 +152,10 @@ def _ends(titles: Sequence[str], place: str) -> tuple[int, int, bool]:
         if end not in (0, 1):
             raise FormatError(f"{place}: {_no_ends(titles)}")
         source, target = (1 - end, end) if source is None else (end, 1 - end)
+    pair = re.fullmatch(_NEUTRAL, " ".join(written[k] for k in (source, target)))
+    told = pair or None not in found or any(re.fullmatch(_REST[:-1] + "+", written[k]) for k in (source, target))
+    if len(titles) > 3 and find(titles, (*WEIGHT, *SIGN), place) not in (2, None) and not told:
+        raise FormatError(f"{place}: {_no_ends(titles)}")  # of more than two columns before the weight
     if any(re.fullmatch(_NO_END, written[k]) and len(titles[k]) != 1 for k in (source, target)):
         raise FormatError(f"{place}: {_no_ends(titles)}")
     return source, target, found != [None, None]
@@ -188,6 +194,9 @@ def named_columns(titles: Sequence[str], place: str) -> Columns:
     """
     _refuse_family(titles, place)
     source, target, _ = edge_columns(titles, place) or (0, 1, None)
+    if source > target and any(re.fullmatch(_STARTS[1], plain(title)) for title in titles[:2]):
+        what = f"who is heard, {shorten(titles[0])} or {shorten(titles[source])}?"
+        raise FormatError(f"{place}: {what} Tell the three columns: --columns source,target,NAME")
     weight, sign = weight_and_sign(titles, place)
     if weight is None:
         if is_number("".join(titles[2:3])):
@@ -221,10 +230,10 @@ def _told(titles: tuple[str, ...], others: Sequence[Sequence[str]], place: str, 
     return Columns(at[0], at[1], at[2], titles=titles, told=True, notes=(_note(titles, *at),))
 
 
-def columns_of_comment(titles: Sequence[str], place: str) -> str:
+def columns_of_comment(titles: Sequence[str], place: str, prose: bool = False) -> str:
     """Return the columns of source, target and weight that titles in a comment tell, from 1; "" of the usual three.
 
-    Titles name both ends, or one, and a weight; other comments are prose.
+    Titles name both ends, or one, and a weight; what may be prose names both ends first.
 
     Examples
     --------
@@ -241,7 +250,7 @@ def columns_of_comment(titles: Sequence[str], place: str) -> str:
         weight = next((k for k in rest if _tells_weight(titles[k])), rest[0])
         known = {source, target} == {0, 1} or _tells_weight(titles[weight])
         return ",".join(str(k + 1) for k in (source, target, weight)) if known else ""
-    if len(titles) < 3:
+    if len(titles) < 3 or (prose and not (_both_ends(titles) or re.fullmatch(_OF_MATRIX, written[2]))):
         return ""
     listens, heard = "|".join((rf"({_LISTENERS}){_REST}", *_ENDS)), "|".join((rf"({_HEARD}){_REST}", *_STARTS))
     turned = bool(re.fullmatch(listens, written[0]) or re.fullmatch(heard, written[1]))
@@ -259,7 +268,7 @@ def _tells_weight(title: str, words: bool = False) -> bool:
 
 def _both_ends(titles: Sequence[str]) -> bool:
     """Tell whether both of the first two titles are words for an end, or for a node such as gene."""
-    words = "|".join((rf"({_LISTENERS}){_REST}", rf"({_HEARD}){_REST}", *_STARTS, *_ENDS, _REST))
+    words = "|".join((rf"({_LISTENERS}){_REST}", rf"({_HEARD}){_REST}", *_STARTS, *_ENDS, _REST, _SOMEBODY))
     return all(re.fullmatch(words, plain(title)) for title in titles[:2])
 
 
@@ -313,6 +322,7 @@ def _is_title(titles: Sequence[str], title: str, below: Sequence[str], nodes: It
     words = "|".join((_LISTENERS, _HEARD, *_STARTS, *_ENDS))
     ends = [re.fullmatch(words, plain(end)) is not None for end in titles[:2]]
     numbered = re.fullmatch(_NEUTRAL, " ".join(map(plain, titles[:2]))) is not None and len(titles[0]) > 1
+    numbered = numbered and re.search("[a-z]{2}", titles[0]) is not None
     if title.lower().endswith("s") or not (any(ends) or numbered):
         return False
     if not any(ends) and any(re.fullmatch(re.escape(titles[0][:-1]) + r"\d+", node) for node in nodes):

@@ -117,6 +117,8 @@ def table_as_matrix(table: Sequence[Line], name: str) -> Rows | None:
     if not lines[0][0] and all(lines[0][1:]) and all(map(is_entry, filter(None, lines[1][1:]))) and lines[1][0]:
         what = "looks like a matrix with names, and its rows and columns have different ones"
         raise FormatError(f"{name}, line 1: {what}; give both the same, or write rows of edges")
+    if lines[0] == [str(k) for k in range(n)] and _plain(lines[1:]) is not None:
+        raise FormatError(f"{name}, line 1: numbers of columns above a matrix, or an edge? Leave this row out")
     if n == len(lines[0]) == len(set(lines[0])) and all(lines[0]) and not any(map(is_entry, lines[0])):
         rows = _plain(lines[1:])  # only columns have labels
         return None if rows is None else _told(lines[0], lines[1:])

@@ -266,6 +266,6 @@ def _stages(late: LateBounds) -> Facts:
         yield Fact(head="late", note=note)
     elif late.direct:
         yield Fact(head="late", note="every agent exactly at its final state at T: all hear of leaders alone")
-    elif late.staged is not None:
+    elif late.staged is not None and late.largest:
         when = f"from {near(min(late.staged))} to {near(max(late.staged))}, {near(late.messages.age)} apart"
         yield Fact(head="late", note=f"exactly at x(T) by T if agents have deadlines of their own, {when}")

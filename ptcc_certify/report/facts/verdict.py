@@ -34,7 +34,8 @@ def protocol_facts(certificate: Certificate, origins: Mapping[str, str]) -> Fact
     """Tell the protocol with its parameters, and where the initial state comes from."""
     text = f"{gains_text(certificate.protocol)}; {', '.join(_beginning(certificate, origins)) or 'no x(0)'}"
     yield Fact(head="protocol", value=certificate.protocol, note=text)
-    if certificate.limits or certificate.noise is not None or certificate.delta is not None:
+    more = certificate.limits or certificate.noise is not None or certificate.delta is not None
+    if more and certificate.proof.asked_messages is None:
         text = "a line that names no limits, noise or disturbances is without them"
         yield Fact(head="protocol", note=text, detail=True)
 

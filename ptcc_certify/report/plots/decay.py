@@ -26,7 +26,7 @@ _BELOW_FLOOR = 1e-2
 #: 1 - t/T down to which bounds are drawn where there is no run, and how many instants.
 _LAST, _INSTANTS = 1e-8, 401
 #: What is told where there is nothing to draw.
-_NONE = "nothing decays: every agent begins where it ends, or nearer to it than a run tells; draw its states"
+NONE = "nothing decays: every agent begins where it ends, or nearer to it than a run tells; draw its states"
 #: The name of the best bound among those of the Lyapunov functions.
 _BEST = "best"
 
@@ -110,7 +110,7 @@ def plot_decay(
     bounded = bool(bounds) and bool((best > _BELOW_FLOOR * floor).any())
     seen = np.full(norm.size, np.nan) if run is None else resolved(norm, best, floor)
     if not bounded and not np.isfinite(seen).any():
-        raise NothingDecays(_NONE)
+        raise NothingDecays(NONE)
     scale = float(norm[0] if norm[0] > floor else 0) or (float(best[0]) if bounds else 0.0) or float(norm.max())
     place = _places(subject.protocol.gain, run, remaining)[axis]
     ax = axes_of(ax)
@@ -149,7 +149,7 @@ def _draw_signals(ax: Axes, certificate: Certificate, runs: Sequence[Trajectory]
     place = {"left": first.remaining, "time": first.t, "clock": first.clock}[axis][before]
     floor = FLOOR_FACTOR * first.rtol * (float(np.abs(first.states[:, 0]).max()) or 1.0)
     if not (bound >= floor).any():
-        raise NothingDecays(_NONE)
+        raise NothingDecays(NONE)
     own = certificate.family_proof.signal == "any" or keeps_promise(certificate, runs)
     names = {False: "random signals" if own else "any signal (random)", True: "worst cases found"}
     known = _known_end(certificate)

@@ -11,6 +11,7 @@ from ptcc_certify.bounds.delay.late_messages import LateBounds
 from ptcc_certify.bounds.tracking import Tracking
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import Change, ParameterError
+from ptcc_certify.report.plots.decay import NONE, NothingDecays
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.report.plots.subject import certificate_of, certifies_family
 from ptcc_certify.simulation.late_messages import can_run, simulate_late
@@ -26,6 +27,10 @@ _RUNS: dict[str, dict[str, Any]] = {
 _NEARER = 0.5
 #: A lower bound at ``T`` is drawn from this share of the upper one on.
 _SEEN = 1e-3
+
+
+#: Bounds below which nothing is to be seen.
+_NOTHING = 1e-200
 
 
 @styled
@@ -70,8 +75,11 @@ def plot_tracking(subject: Any, *, ax: Axes | None = None, time_unit: str = "") 
     if late is None and tracking is None:
         what = "the certificate says nothing of late messages or of leaders that move; certify with "
         raise ParameterError((what, Change("delay"), " or ", Change("leader_speed")))
-    ax, T = axes_of(ax), float(certificate.protocol.T)
+    T = float(certificate.protocol.T)
     t = np.linspace(0, T, 401)
+    if late is not None and (late.of_followers or late.of_all) and late.largest_bound(t).max() < _NOTHING:
+        raise NothingDecays(NONE)
+    ax = axes_of(ax)
     if not certificate.of_family:
         if x0 is None or (late is not None and certificate.proof.final_state is None):
             raise ParameterError("the certificate has no initial state to run from; certify with x0")
@@ -126,7 +134,7 @@ def _draw_late_bound(ax: Axes, late: LateBounds, t: np.ndarray) -> None:
     if late.of_followers or late.of_all:
         over_time = late.largest_bound(t)
         ax.plot(t, over_time, color=BOUND, linewidth=1.8, label="proved bound")
-        nearer = bool(late.largest < _NEARER * over_time[-1])
+        nearer = 0 < late.largest < _NEARER * float(over_time[-1])
     else:
         nearer = late.form is not None
     if nearer:  # another proof, which says nothing of what is before T
