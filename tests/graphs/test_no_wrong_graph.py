@@ -853,6 +853,12 @@ WORDS_OR_TITLES = [
             *("Data from BitcoinTrust", "to measure influence"),
         )
     ),
+    *(
+        Input("g.txt", f"% {line} weight\n1 2 1.5\n2 3 -2\n", says=("--columns 2,1,3",))
+        for line in ("listener speaker", "reader writer", "sink source")
+    ),
+    Input("g.txt", "# Undirected network was collected by Zachary\n1 2 1\n2 3 -2\n", says=("--undirected",)),
+    Input("g.txt", "# converted from W\n1 2 1\n2 3 -2\n", "1>2=1 2>3=-2"),
     Input("g.csv", "# target,source,weight\ra,b,1\rb,c,-1\r", says=("--columns 2,1,3",)),
     Input("g.csv", "# edge list: (target, source, weight)\na,b,1\nb,c,-1\n", says=("--columns 2,1,3",)),
     Input("g.txt", "HDAC1 HDAC2 Repression\nTP53 MDM2 Activation\n", "HDAC1>HDAC2=-1 TP53>MDM2=1"),

@@ -18,7 +18,14 @@ from ptcc_certify.graphs.io.files import lines_of
 from ptcc_certify.graphs.io.problems import Problem, Problems, one_message
 from ptcc_certify.graphs.io.raw_edges import DECIMALS, HEADER_MEND, Beside, Draft, Numbers, Rows, Signs
 from ptcc_certify.graphs.io.signs import WEIGHT, plain, sign_of_word, weight_and_sign
-from ptcc_certify.graphs.io.table_columns import Columns, asks_of_corner, columns_of, columns_of_comment, names_edges
+from ptcc_certify.graphs.io.table_columns import (
+    Columns,
+    asks_of_corner,
+    columns_of,
+    columns_of_comment,
+    edge_columns,
+    names_edges,
+)
 from ptcc_certify.graphs.io.text_matrices import bracketed_matrix, is_entry, table_as_matrix
 from ptcc_certify.graphs.labels import first_five, ordered_labels
 from ptcc_certify.graphs.rationals import parse_exact, shorten
@@ -32,8 +39,9 @@ _LOOKED_AT, _EXTRA, _SIGN_AT = 20, 10**5, {"first": "2,3,1", "second": "1,3,2"}
 _TIMES = 1900
 #: What comments say of undirected edges: that the graph is, or that it is no directed one; others are told as comments.
 _NO = r"\s*[:=?]\s*(false|no?|0|none|n/a)(?=\s*($|[.;,|(]|\w+\s*[:=]|-\s))"
+_DONE = "(removed|replaced|dropped|deleted|split|converted|turned|merged|expanded|doubled)"
 _UNDIRECTED = re.compile(
-    rf"^[\s#%]*(undirected\b(?!{_NO}|\s+(false|no)\s*$|\s+\w+\s*:\s*0|\s+\w+\s+((has|have) been|was|were)\s+\w+ed\b)"
+    rf"^[\s#%]*(undirected\b(?!{_NO}|\s+(false|no)\s*$|\s+\w+\s*:\s*0|\s+\w+\s+((has|have) been|was|were)\s+{_DONE}\b)"
     r"|(weighted|signed),?\s+undirected\b|(this|it|(this|the) (graph|network)) is (an )?undirected\b"
     rf"|(is[\s_]?)?directed( graph| network)?({_NO}|\s+false\s*$))|^[\s#%]*[\w ]*[:=]\s*undirected[\s.;,]*$",
     re.IGNORECASE,
@@ -195,7 +203,7 @@ def _note_on_directions(data: bytes, understood: str, width: int) -> tuple[str, 
     ()
     """
     for line in comments_above(data):
-        titles = any(names_edges(titles) for titles, _ in _titles_of(line, width))
+        titles = any(edge_columns(titles, "") for titles, _ in _titles_of(line, width))
         if not understood and not titles and _OF_DIRECTIONS.search(line):
             return (f"ignored as a comment: {shorten(line.strip())}",)
     return ()

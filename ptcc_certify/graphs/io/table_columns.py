@@ -25,13 +25,13 @@ from ptcc_certify.graphs.reading import Reading
 _SOURCE = ("source", "from", "fromnodeid", "fromnode", "fromid", "sourcenode", "sourceid", "src", "rater")
 _TARGET = ("target", "to", "tonodeid", "tonode", "toid", "targetnode", "targetid", "dst", "rated", "ratee")
 #: Titles of who listens in the first column, and of who is heard in the second: they turn the direction round.
-_LISTENERS = r"listen|follower|rater|trust[eo]r|voter|receiver|hear(s|er|ing)|reader|subscriber|observer"
-_HEARD = r"listens|hears|speaker|heard|followee|followed|rated|trustee|trusted|sender|leader"
+_LISTENERS = r"listen(er|s|ing)?|follower|rater|trust[eo]r|voter|receiver|hear(s|er|ing)|reader|subscriber|observer"
+_HEARD = r"listens|hears|speaker|heard|followee|followed|rated|trustee|trusted|sender|writer|leader"
 #: What follows the name of an end in a title, and words for either end: the first count in any column, the others,
 #: which may tell times or places, only in the first two.
 _REST = r"(node|vertex|gene|protein|agent|id|name|label|index)*"
 _STARTS = (rf"(source|src|from){_REST}", rf"(start|origin|orig|tf|transcriptionfactor|regulator|influencer){_REST}")
-_ENDS = (rf"(target|tgt|dst|to){_REST}", rf"(end|dest|destination|influenced|regulated){_REST}")
+_ENDS = (rf"(target|tgt|dst|to){_REST}", rf"(end|sink|dest|destination|influenced|regulated){_REST}")
 #: Who may be at either end.
 _SOMEBODY = r"(user|person|people|actor|member|country|state|player|character)s?"
 #: Titles of times; of what is no node, and of what is no weight.
@@ -250,11 +250,14 @@ def columns_of_comment(titles: Sequence[str], place: str, prose: bool = False) -
         weight = next((k for k in rest if _tells_weight(titles[k])), rest[0])
         known = {source, target} == {0, 1} or _tells_weight(titles[weight])
         return ",".join(str(k + 1) for k in (source, target, weight)) if known else ""
-    if len(titles) < 3 or (prose and not (_both_ends(titles) or re.fullmatch(_OF_MATRIX, written[2]))):
+    if len(titles) < 3:
         return ""
+    both = _both_ends(titles)
     listens, heard = "|".join((rf"({_LISTENERS}){_REST}", *_ENDS)), "|".join((rf"({_HEARD}){_REST}", *_STARTS))
     turned = bool(re.fullmatch(listens, written[0]) or re.fullmatch(heard, written[1]))
-    weights = [k for k in range(2, len(titles)) if _tells_weight(titles[k], _both_ends(titles))]
+    weights = [k for k in range(2, len(titles)) if _tells_weight(titles[k], both)]
+    if prose and not both:  # nothing but the usual titles of weights
+        weights = [k for k in weights if names_edges([titles[k]]) and len(titles[k]) > 1]
     if entry := re.fullmatch(_OF_MATRIX, written[2]):
         weights, turned = [2], written[1] != entry[1][0]
     return f"2,1,{weights[0] + 1}" if turned and weights else ""
