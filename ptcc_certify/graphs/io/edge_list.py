@@ -46,9 +46,9 @@ _UNDIRECTED = re.compile(
     rf"|(is[\s_]?)?directed( graph| network)?({_NO}|\s+false\s*$))|^[\s#%]*[\w ]*[:=]\s*undirected[\s.;,]*$",
     re.IGNORECASE,
 )
-#: What comments say of directions in other words.
-_OF_DIRECTIONS = re.compile(
-    r"undirected|symmetric|\bnot directed|\bdirected\s*[:=]|revers|"
+#: What else comments say of undirected edges, and, where no header does, of ends.
+_OF_DIRECTIONS = re.compile(r"undirected|\bsymmetric|\bnot directed|\bdirected\s*[:=]|\brevers", re.IGNORECASE)
+_OF_ENDS = re.compile(
     r"\b(source|from|sender|src|tf|regulator)\b.*\b(target|to|receiver|dst|gene)\b|"
     r"\b(target|to|receiver|dst|gene)\b.*\b(source|from|sender|src|tf|regulator)\b|\blisten",
     re.IGNORECASE,
@@ -151,7 +151,9 @@ def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
     draft = EdgeList(name, columns, started)
     draft.read(chain(begin, numbered))
     rows = draft.rows()
-    rows.notes += notes_on_comments(data) or _note_on_directions(data, undirected, len(table[0]) if table else 0)
+    rows.notes += notes_on_comments(data) or _note_on_directions(
+        data, undirected, 0 if columns.titles or not table else len(table[0])
+    )
     if rows.problems and not columns.titles:  # of which the other rules say nothing
         place, message = one_message(rows.problems, " ".join)
         raise FormatError(f"{', '.join(filter(None, (name, place)))}: {message}")
@@ -195,6 +197,8 @@ def _note_on_names(data: bytes, n: int) -> tuple[str, ...]:
 def _note_on_directions(data: bytes, understood: str, width: int) -> tuple[str, ...]:
     r"""Note a comment above the rows that speaks of directions in words which are not understood here.
 
+    The width is that of rows without a header, 0 where titles tell the ends.
+
     Examples
     --------
     >>> _note_on_directions(b"# friends (undirected)\na,b,1\n", "", 3)
@@ -204,7 +208,8 @@ def _note_on_directions(data: bytes, understood: str, width: int) -> tuple[str, 
     """
     for line in comments_above(data):
         titles = any(edge_columns(titles, "") for titles, _ in _titles_of(line, width))
-        if not understood and not titles and _OF_DIRECTIONS.search(line):
+        ends = width > 0 and not titles and _OF_ENDS.search(line)
+        if not understood and (ends or _OF_DIRECTIONS.search(line)):
             return (f"ignored as a comment: {shorten(line.strip())}",)
     return ()
 
