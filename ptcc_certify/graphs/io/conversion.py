@@ -161,7 +161,8 @@ def _rows_of_table(table: Any, how: Reading) -> Rows | None:
         [*table[table.columns[columns.weight]]],
         beside,
     )
-    rows.table, rows.notes = True, tuple(note for note in columns.notes if note not in (BY_HEADER, RATERS))
+    rows.kind = "DataFrame"
+    rows.notes = tuple(note for note in columns.notes if note not in (BY_HEADER, RATERS))
     return rows
 
 

@@ -6,24 +6,23 @@ import csv
 import re
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
-from itertools import chain, islice, product
+from itertools import chain, islice
 
 import numpy as np
 
 from lmi.exact.decimal_rounding import counted
 from ptcc_certify.errors import FormatError, NumberError
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.io import comments
 from ptcc_certify.graphs.io.columns_beside import Column
 from ptcc_certify.graphs.io.files import lines_of
 from ptcc_certify.graphs.io.problems import Problem, Problems, one_message
 from ptcc_certify.graphs.io.raw_edges import DECIMALS, HEADER_MEND, Beside, Draft, Numbers, Rows, Signs
-from ptcc_certify.graphs.io.signs import WEIGHT, plain, sign_of_word, weight_and_sign
+from ptcc_certify.graphs.io.signs import WEIGHT, plain, sign_of_word
 from ptcc_certify.graphs.io.table_columns import (
     Columns,
     asks_of_corner,
     columns_of,
-    columns_of_comment,
-    edge_columns,
     names_edges,
 )
 from ptcc_certify.graphs.io.text_matrices import bracketed_matrix, is_entry, table_as_matrix
@@ -37,22 +36,6 @@ _SEPARATORS = ("\t", ",", ";", None)  # None: blanks
 _LOOKED_AT, _EXTRA, _SIGN_AT = 20, 10**5, {"first": "2,3,1", "second": "1,3,2"}
 #: From this number on a number after the third column is taken for a year or a time.
 _TIMES = 1900
-#: What comments say of undirected edges: that the graph is, or that it is no directed one; others are told as comments.
-_NO = r"\s*[:=?]\s*(false|no?|0|none|n/a)(?=\s*($|[.;,|(]|\w+\s*[:=]|-\s))"
-_DONE = "(removed|replaced|dropped|deleted|split|converted|turned|merged|expanded|doubled)"
-_UNDIRECTED = re.compile(
-    rf"^[\s#%]*(undirected\b(?!{_NO}|\s+(false|no)\s*$|\s+\w+\s*:\s*0|\s+\w+\s+((has|have) been|was|were)\s+{_DONE}\b)"
-    r"|(weighted|signed),?\s+undirected\b|(this|it|(this|the) (graph|network)) is (an )?undirected\b"
-    rf"|(is[\s_]?)?directed( graph| network)?({_NO}|\s+false\s*$))|^[\s#%]*[\w ]*[:=]\s*undirected[\s.;,]*$",
-    re.IGNORECASE,
-)
-#: What else comments say of undirected edges, and, where no header does, of ends.
-_OF_DIRECTIONS = re.compile(r"undirected|\bsymmetric|\bnot directed|\bdirected\s*[:=]|\brevers", re.IGNORECASE)
-_OF_ENDS = re.compile(
-    r"\b(source|from|sender|src|tf|regulator)\b.*\b(target|to|receiver|dst|gene)\b|"
-    r"\b(target|to|receiver|dst|gene)\b.*\b(source|from|sender|src|tf|regulator)\b|\blisten",
-    re.IGNORECASE,
-)
 #: From this number on whole weights throughout are taken for seconds since 1970.
 _SECONDS = 10**8
 
@@ -124,7 +107,7 @@ def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
         raise FormatError(f'{name}, line 1: a Matrix Market file; name it .mtx or pass the format "mtx"')
     if not how.titles and (matrix := bracketed_matrix(data, name)) is not None:
         return matrix
-    undirected = direction_of_comments(data, name)
+    undirected = comments.undirected_by_comment(data, name)
     numbered = records(data, name)
     begin = list(islice(numbered, _LOOKED_AT))
     table = [row for _, row in begin if len(row) > 1]
@@ -141,7 +124,7 @@ def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
             if (corner := table[0][0].strip()) not in matrix.labels:
                 matrix.asks = asks_of_corner(corner, f"line {started}")
             if len(table) == len(matrix.labels):  # without a row of names
-                matrix.notes += _note_on_names(data, len(table))
+                matrix.notes += comments.note_on_names(data, len(table))
             return matrix
     columns = columns_of(table[0], table[1:], f"{name}, line {started}", how) if table else Columns()
     if columns.titles:
@@ -151,86 +134,17 @@ def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
     draft = EdgeList(name, columns, started)
     draft.read(chain(begin, numbered))
     rows = draft.rows()
-    rows.notes += notes_on_comments(data) or _note_on_directions(
+    rows.notes += comments.note_on_rows(data) or comments.note_on_directions(
         data, undirected, 0 if columns.titles or not table else len(table[0])
     )
     if rows.problems and not columns.titles:  # of which the other rules say nothing
         place, message = one_message(rows.problems, " ".join)
         raise FormatError(f"{', '.join(filter(None, (name, place)))}: {message}")
     if not columns.titles and not columns.told:
-        _refuse_titles_of_comments(data, name, len(table[0]) if table else 0)
+        comments.refuse_titles(data, name, len(table[0]) if table else 0)
         _refuse_ambiguous(draft, rows, data, konect)
     rows.undirected = undirected
     return rows
-
-
-def notes_on_comments(data: bytes) -> tuple[str, ...]:
-    r"""Note comments that look like rows of edges, which a label that begins with # makes of one.
-
-    Examples
-    --------
-    >>> notes_on_comments(b"#Gene1,Gene2,Score\na,b,1\n#b,a,2\n")
-    ('ignored as a comment: #b,a,2',)
-    """
-    found = re.findall(rb"^[ \t]*[#%][^\s#%,;].*$", data, re.MULTILINE)
-    lines = [line for line in found if _is_row_of_edges(line.decode("utf-8", "replace").strip())]
-    if not lines:
-        return ()
-    rest = f" and {len(lines) - 1} more" if len(lines) > 1 else ""
-    return (f"ignored as a comment: {shorten(lines[0].decode('utf-8', 'replace').strip())}{rest}",)
-
-
-def _note_on_names(data: bytes, n: int) -> tuple[str, ...]:
-    r"""Note a comment above a matrix that has as many words as there are nodes, as ``numpy.savetxt(header=..)`` does.
-
-    Examples
-    --------
-    >>> _note_on_names(b"# a b\n0 1\n-1 0\n", 2)
-    ('ignored as a comment: # a b; names are a first row',)
-    """
-    for line in islice((line.strip() for line in data[:10000].decode("utf-8", "replace").splitlines()), n):
-        if line[:1] in ("#", "%") and len(re.findall(r"[^\s,;#%]+", line)) == n:
-            return (f"ignored as a comment: {shorten(line)}; names are a first row",)
-    return ()
-
-
-def _note_on_directions(data: bytes, understood: str, width: int) -> tuple[str, ...]:
-    r"""Note a comment above the rows that speaks of directions in words which are not understood here.
-
-    The width is that of rows without a header, 0 where titles tell the ends.
-
-    Examples
-    --------
-    >>> _note_on_directions(b"# friends (undirected)\na,b,1\n", "", 3)
-    ('ignored as a comment: # friends (undirected)',)
-    >>> _note_on_directions(b"# source,target,weight\na,b,1\n", "", 3)
-    ()
-    """
-    for line in comments_above(data):
-        titles = any(edge_columns(titles, "") for titles, _ in _titles_of(line, width))
-        ends = width > 0 and not titles and _OF_ENDS.search(line)
-        if not understood and (ends or _OF_DIRECTIONS.search(line)):
-            return (f"ignored as a comment: {shorten(line.strip())}",)
-    return ()
-
-
-def _is_row_of_edges(comment: str) -> bool:
-    """Tell whether a comment has three fields or more and a number, the third of those between blanks, or a sign."""
-    fields = re.split(r"\s*[,;\t]\s*", comment)
-    return any(map(is_entry, fields[1:])) if len(fields) > 2 else any(map(is_entry, comment.split()[2:3]))
-
-
-def direction_of_comments(data: bytes, name: str) -> str:
-    """Return what comments before the first row say of undirected edges, as KONECT and SNAP do; "" if nothing."""
-    for number, line in enumerate(comments_above(data), 1):
-        if konect := re.match(r"\s*%\s*(sym|asym|bip)\b", line):
-            if konect[1] == "bip":
-                mend = "give the nodes of each its own names, such as u1 and v1, and leave out this line"
-                raise FormatError(f"{name}, line {number}: % bip: two sets of nodes share their numbers; {mend}")
-            return "% sym" if konect[1] == "sym" else ""
-        if _UNDIRECTED.search(line):
-            return f"the comment {shorten(line.strip())}"
-    return ""
 
 
 class EdgeList(Draft):
@@ -341,58 +255,6 @@ def _refuse_titles(row: list[str], place: str, data: bytes) -> None:
         if re.search(rb"[;\t]\s*[+-]?\d+,\d+\s*$", data, re.MULTILINE):
             mend += DECIMALS
         raise FormatError(f"{place}: the header {titles} names no source and target; {mend}")
-
-
-def _refuse_titles_of_comments(data: bytes, name: str, width: int) -> None:
-    """Refuse rows without a header whose columns a comment names in another order, as numpy.savetxt writes it.
-
-    It has as many titles as rows have fields, see :func:`_titles_of`.
-    """
-    for line in comments_above(data):
-        for titles, prose in _titles_of(line, width):
-            if columns := columns_of_comment(titles, name, prose):
-                mend = f"remove {line.strip()[0]} before {shorten(titles[0])}"
-                if None in weight_and_sign(titles, name):
-                    mend += f", or tell them: --columns {columns}"
-                raise FormatError(f"{name}: a comment names the columns; {mend}")
-
-
-def _titles_of(line: str, width: int) -> Iterator[tuple[list[str], bool]]:
-    r"""Yield so many titles of a comment, between commas, semicolons or tabs, or between blanks and any of these.
-
-    What stands before a colon or around brackets is none of them. The second item tells that it may be prose.
-
-    Examples
-    --------
-    >>> [titles for titles, _ in _titles_of("# Columns (to, from, weight)", 3)][0]
-    ['to', 'from', 'weight']
-    """
-    text = re.sub(r"^[\s#%]*([\w ]*:)?\s*", "", line).rstrip()
-    inner = re.fullmatch(r"[\w ]*\(([^()]*)\)", text)
-    separators = (",", ";", r"\t", r"[,;\t ]")
-    for told, separator in product([text] if inner is None else [inner[1], text], separators):
-        titles = [title.strip(" \"'") for title in re.split(rf"\s*{separator}\s*(?![^(]*\))", told)]
-        if len(titles) == width == len(set(map(plain, titles))) and not re.search("[./:]", "".join(titles)):
-            yield titles, len(separator) > 2
-
-
-def comments_above(data: bytes) -> Iterator[str]:
-    r"""Yield the lines above the first row, which are comments or empty.
-
-    Examples
-    --------
-    >>> [*comments_above(b"# a\n\n%b\n1,2,1\n# c\n")]
-    ['# a', '', '%b']
-    """
-    begins, text = 0, data.removeprefix(b"\xef\xbb\xbf")
-    while begins < len(text):
-        found = re.compile(rb"\r\n|\r|\n").search(text, begins)
-        ends = found.end() if found else len(text)
-        line = text[begins:ends].decode("utf-8", "replace").rstrip("\r\n")
-        if line.strip()[:1] not in "#%":
-            return
-        yield line
-        begins = ends
 
 
 def _refuse_ambiguous(draft: EdgeList, rows: Rows, data: bytes, konect: bool) -> None:

@@ -358,7 +358,7 @@ class _Draft:
             self.fail(self.name, f"{what}, or add {no} if these are self-loops")
         if found.laplacian and (self.rows.matrix or found.loops > 1):
             what = "the diagonal holds the sums of the other entries, as a Laplacian's"
-            if not (self.name or self.rows.matrix or self.rows.table):
+            if not self.name and self.rows.kind == "edges":
                 self.fail(self.name, f"{what}; give the matrix with laplacian=True, or leave the self-loops out")
             both = ("undirected",) if self.undirected and not self.how.undirected else ()
             mend = f"read it with {self.call('laplacian', *both)}, or add {no} if these are self-loops"

@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 from lmi.exact.decimal_rounding import counted
 from ptcc_certify.errors import FormatError, GraphError, ParameterError
+from ptcc_certify.graphs.io import comments
 from ptcc_certify.graphs.io.columns_beside import notes_on_ignored, signs_beside_intervals
-from ptcc_certify.graphs.io.edge_list import EdgeList, direction_of_comments, notes_on_comments, records
+from ptcc_certify.graphs.io.edge_list import EdgeList, records
 from ptcc_certify.graphs.io.files import Source, name_and_ending
 from ptcc_certify.graphs.io.graph_files import format_of, graph_bytes, is_edge_list
 from ptcc_certify.graphs.io.interval_edges import Entry, Interval, known, told_weights
@@ -145,7 +146,7 @@ def read_interval_rows(path: Source, how: Reading, share: Fraction) -> IntervalR
         text = str(error)
     if text:
         raise FormatError(f"{table.name}: {text}")
-    rows.notes += (*edges.nodes_alone(), *notes_on_ignored(beside), *notes_on_comments(table.data))
+    rows.notes += (*edges.nodes_alone(), *notes_on_ignored(beside), *comments.note_on_rows(table.data))
     take(rows, entries, how, share, edges.broken)
     mended = [kind for kind, option in (("loop", how.drop_self_loops), ("zero", how.drop_zeros)) if option]
     found = edges.broken.told(*mended)
@@ -206,7 +207,7 @@ def _of_the_header(table: _Table, how: Reading) -> list[Problem]:
     name, (_, _, weight), (low, _, _) = table.name, table.ends, table.columns
     if low is None and weight is None:
         raise FormatError(f"{name}: the header names no weight; name a column weight, or weight_min and weight_max")
-    if (said := direction_of_comments(table.data, name)) and not how.undirected:
+    if (said := comments.undirected_by_comment(table.data, name)) and not how.undirected:
         return [Problem("", f"{said} means undirected edges", "let each go both ways with {}", "--undirected")]
     return []
 

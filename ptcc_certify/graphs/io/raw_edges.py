@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -56,11 +56,15 @@ class Rows:
     undirected: str = ""  # what in the file says that its edges have no direction
     in_order: bool = True  # do the rows come as they stand in the file?
     headerless: bool = False
-    matrix: bool = False  # entries of a matrix, whose rows listen unless it is said that they inform
-    table: bool = False  # a DataFrame, of which all that is told of files may be said
+    kind: Literal["edges", "matrix", "DataFrame"] = "edges"  # a DataFrame is told what files are told
     notes: tuple[str, ...] = ()
     problems: Sequence[Problem] = ()  # what is wrong with rows that are left out
     asks: str = ""  # why the direction must be told
+
+    @property
+    def matrix(self) -> bool:
+        """Whether these are entries of a matrix, whose rows listen unless it is said that they inform."""
+        return self.kind == "matrix"
 
 
 class Numbers(dict[str, int]):
@@ -129,7 +133,9 @@ def rows_of(
     >>> rows_of(["a", "b"], [0, 1], [1, 0], ["-0.5", "-0.5"]).weights
     ['-0.5']
     """
-    return Rows(labels, first, second, *distinct(weights), beside=beside or Beside(), matrix=matrix)
+    return Rows(
+        labels, first, second, *distinct(weights), beside=beside or Beside(), kind="matrix" if matrix else "edges"
+    )
 
 
 def distinct(values: Any) -> tuple[Any, Any]:

@@ -117,17 +117,12 @@ def _motion(part: AgentsAnswer) -> str:
     return "their places in the common motion" if part.formation else "the common motion"
 
 
-def _bound_text(bound: float, part: AgentsAnswer) -> str:
-    """Write a bound of deviations from above."""
-    return "0" if part.never_off else up(bound, 2)
-
-
 def _named(bounds: Sequence[float], part: AgentsAnswer) -> str:
     """Tell bounds of positions, velocities and so on."""
     words = []
     for i, bound in enumerate(bounds):
         name = PLURALS[i] if i < len(PLURALS) else f"derivatives {i}"
-        words.append(f"{name} within {_bound_text(bound, part)}")
+        words.append(f"{name} within {up(0 if part.never_off else bound, 2)}")
     return ", ".join(words) + f" of {_motion(part)}"
 
 
@@ -163,7 +158,7 @@ def _deviation_facts(part: AgentsAnswer) -> Facts:
         worst = part.deviation_bound(np.array([q for q, _ in _INSTANTS]))[:, i].max(axis=0)
         if np.isfinite(worst).all():
             pairs = zip(worst.tolist(), _INSTANTS, strict=True)
-            bounds = ", ".join(f"{_bound_text(x, part)} at {name}" for x, (_, name) in pairs)
+            bounds = ", ".join(f"{up(0 if part.never_off else x, 2)} at {name}" for x, (_, name) in pairs)
             name = DERIVATIVES[i] if i < len(DERIVATIVES) else f"derivative {i}"
             yield Fact(head="deviation", note=f"{name}: from {_motion(part)} at most {bounds}", detail=True)
 
