@@ -174,7 +174,19 @@ class Late:
                 found.append(level * exp(-b * clock)[1])
         return max(found) * (1 + ROOM)
 
-    def inputs(self, step: Json, entry: Json, error: Fraction, gain_cap: Fraction) -> list[Fraction]:
+    def falling(self, step: Json, entry: Json, push: Fraction, sign: Fraction, p: Fraction) -> list[Fraction]:
+        """The same without a cap, where nothing is late: ``p = b k`` is above 1, or at least 1 without a push."""
+        u, found = step["bound"][0], [Fraction(0)] * len(self.labels)
+        y = (self.rho1 + self.k / self.T) * number(entry["initial"])
+        if push:
+            y += push / min(u.values()) * (self.rho1 * self.T + self.k) / (p - 1)
+        for v in self.followers:
+            found[v] = (self.D[v] * u[v] + sum((w * u[s] for s, w in self.heard[v]), Fraction(0))) * y + sign
+        return found
+
+    def inputs(
+        self, step: Json, entry: Json, error: Fraction, gain_cap: Fraction, sign: Fraction = Fraction(0)
+    ) -> list[Fraction]:
         """What an entry of ``rows`` proves of the inputs of all agents."""
         u, b, floor, found = step["bound"][0], number(step["numbers"]["b"]), number(entry["floor"]), []
         if "after" in entry:
@@ -187,7 +199,7 @@ class Late:
                 continue
             heard, D = sum((w * u[s] for s, w in self.heard[v]), Fraction(0)), self.D[v]
             most = (2 * D - b) * u[v] * number(entry["initial"]) * y
-            found.append((most + gain_cap * (floor * (D * u[v] + heard) + error * D)) * (1 + ROOM))
+            found.append((most + gain_cap * (floor * (D * u[v] + heard) + error * D)) * (1 + ROOM) + sign)
         return found
 
     # ------------------------------------------------------------------ parts
@@ -240,7 +252,7 @@ class Late:
         return entry, {
             "numbers": told,
             "witness": {"u": [text(u[v]) for v in self.followers]},
-            "bound": (u, initial * left + floor + drift),
+            "bound": (u, initial * left + floor + drift, b),
         }
 
     def steps(
@@ -437,9 +449,12 @@ def with_messages(
     staged: bool = False,
     form: Fraction | None = None,
     bounded: bool = True,
-    moving: tuple[Any, Any] | None = None,
+    moving: tuple[Any, ...] | None = None,
 ) -> Json:
-    """The certificate with late messages: as many of the parts as there are; ``moving``: speed and disturbance."""
+    """The certificate with late messages: as many of the parts as there are.
+
+    ``moving``: speed, disturbance and, perhaps, the gain of a sign term.
+    """
     data = copy.deepcopy(data)
     each = latency if isinstance(latency, list) else [latency]
     delay = max(map(Fraction, each))
@@ -465,15 +480,20 @@ def with_messages(
         "lmi": None,
         "input": None,
     }
-    proof, bounds, inputs, push = [], [], [], None
+    proof, bounds, inputs, push, sign = [], [], [], None, Fraction(0)
     if moving is not None:
         push = Fraction(moving[0]) + Fraction(moving[1])
         error += Fraction(moving[0]) * delay
+        if len(moving) > 2 and moving[2] is not None:
+            push, sign = Fraction(0), Fraction(moving[2])
+            said["leaders"]["sign_gain"] = text(sign)
     for q in () if late else qs:
         if (found := case.row(Fraction(q), delay, error, cap, push)) is not None:
             entry, step = found
             bounds.append({v: step["bound"][0][v] * step["bound"][1] for v in case.followers})
-            inputs += [] if cap is None else [case.inputs(step, entry, error, cap)]
+            inputs += [] if cap is None else [case.inputs(step, entry, error, cap, sign)]
+            if push is not None and not delay and not error and (p := step["bound"][2] * case.k) > 1:
+                inputs.append(case.falling(step, entry, push, sign, p))
             proof.append(
                 obligation("late-rows", f"messages.rows[{len(said['rows'])}]", step["numbers"], step["witness"])
             )
@@ -509,31 +529,13 @@ def with_messages(
 
 
 def with_leaders(
-    data: Json, speed: Any = "1/2", disturbance: Any = 0, sign_gain: Any = None, bounded: bool = True
+    data: Json,
+    speed: Any = "1/2",
+    disturbance: Any = 0,
+    sign_gain: Any = None,
+    bounded: bool = True,
+    gain_cap: Any = None,
 ) -> Json:
-    """The certificate with leaders that move."""
-    data = copy.deepcopy(data)
-    case = Late(data)
-    found = case.witness(Fraction(1))
-    assert found is not None
-    u, a = found
-    push, sign = Fraction(speed) + Fraction(disturbance), None if sign_gain is None else Fraction(sign_gain)
-    initial, least = max(case.away(v) / u[v] for v in case.followers), min(u.values())
-    p, inputs = a * case.k, None
-    if bounded and (p > 1 or (sign is not None and p >= 1)):
-        y = (case.rho1 + case.k / case.T) * initial
-        if sign is None:
-            y += push / least * (case.rho1 * case.T + case.k) / (p - 1)
-        inputs = [Fraction(0)] * len(case.labels)
-        for v in case.followers:
-            inputs[v] = (case.D[v] * u[v] + sum((w * u[s] for s, w in case.heard[v]), Fraction(0))) * y + (sign or 0)
-    data["leaders"] = {
-        "speed": text(speed),
-        "disturbance": text(disturbance),
-        "sign_gain": text(sign),
-        "initial": text(initial),
-        "input": None if inputs is None else case.by_agent(inputs),
-        "after": "0" if sign is not None else text(push / (a * case.rho1 * least)),
-    }
-    data["proof"].append(obligation("tracking", "leaders", {"a": text(a)}, {"u": [text(u[v]) for v in case.followers]}))
-    return resealed(data)
+    """The certificate with leaders that move, of which nothing is heard late."""
+    moving = (speed, disturbance, sign_gain)
+    return with_messages(data, 0, qs=(1,), moving=moving, bounded=bounded, gain_cap=gain_cap)

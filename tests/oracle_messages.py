@@ -92,8 +92,6 @@ class LateOracle(Oracle):
         super().judged()
         if "messages" in self.data:
             self.messages()
-        if "leaders" in self.data:
-            self.moving()
 
     # ------------------------------------------------------------------ reading
 
@@ -187,6 +185,22 @@ class LateOracle(Oracle):
         said = self.said["leaders"]
         return None if said is None else (number(said["speed"]), number(said["disturbance"]))
 
+    @cached_property
+    def sign(self) -> Fraction | None:
+        """What followers add times ``sign(e_k)``; None without that."""
+        said = (self.said["leaders"] or {}).get("sign_gain")
+        return None if said is None else number(said)
+
+    @property
+    def push(self) -> Fraction:
+        """How fast a follower and its target may part; the sign term takes that up."""
+        return Fraction(0) if self.fled is None or self.sign is not None else sum(self.fled, Fraction(0))
+
+    @property
+    def tracks(self) -> bool:
+        """Whether leaders move, and nothing is late or off."""
+        return self.fled is not None and not self.delay and not self.error
+
     @property
     def wrong(self) -> Fraction:
         """How far what is heard of a target is off."""
@@ -202,7 +216,7 @@ class LateOracle(Oracle):
             losses = number(packets["losses"])
             self.require(number(packets["period"]) > 0 and losses >= 0 and losses.denominator == 1, "packets")
         self.require(min(self.latencies.values()) >= 0 and number(self.said["delay"]) == self.delay, "delay")
-        self.require(self.error >= 0 and (self.delay or self.error), "value_error")
+        self.require(self.error >= 0 and (self.delay or self.error or self.fled), "value_error")
         self.require(self.cap is None or self.cap > 0, "gain_cap")
         late = self.said["own"] == "late"
         self.require(not late or self.cap is not None, "a late own state without a cap")
@@ -211,6 +225,8 @@ class LateOracle(Oracle):
             self.require(not self.said[key] or (self.single and not late and self.follow), key)
         if self.fled is not None:
             self.require(min(self.fled) >= 0 and "mu1" not in self.gains, "leaders: what they need")
+            self.require(self.sign is None or self.sign >= sum(self.fled), "sign_gain")
+            self.require(self.sign is None or not (late or self.said["steps"]), "a sign term: what it needs")
             self.require(
                 not any(self.said[key] for key in ("missed", "staged", "settling", "form", "lmi")), "leaders move"
             )
@@ -229,7 +245,9 @@ class LateOracle(Oracle):
             self.small_delays()
         if self.said["lmi"] is not None:
             self.delay_lmi()
-        if self.said["input"] is not None:
+        if self.tracks and not self.false:
+            self.tracked()
+        elif self.said["input"] is not None:
             self.slopes()
 
     def slopes(self) -> None:
@@ -317,7 +335,7 @@ class LateOracle(Oracle):
                 self.require(floor * (D * x - heard) >= self.wrong * D, f"{at}: floor of {v}")
                 if self.fled is not None:
                     slowest = min(x for x in (self.gain[1], self.cap) if x is not None)
-                    enough = number(entry["after"]) * (D * x - heard) >= sum(self.fled) / slowest
+                    enough = number(entry["after"]) * (D * x - heard) >= self.push / slowest
                     self.require(enough, f"{at}: after of {v}")
             self.require(initial >= 0 and floor >= 0, f"{at}: negative")
             if self.delay:
@@ -338,7 +356,7 @@ class LateOracle(Oracle):
                     z[-1] = float(left) if runs.times[-1] == T else z[-1]
                 bound = float(initial) * z + float(floor)
                 if self.fled is not None:
-                    bound = bound + self.drifted(b, slow, runs.times) * float(sum(self.fled) / min(u.values()))
+                    bound = bound + self.drifted(b, slow, runs.times) * float(self.push / min(u.values()))
                     whole = float(number(entry["drift"]) + floor + initial * left)
                     self.require(bound[-1] <= whole * (1 + SLACK), f"{at}: drift")
                 for v, x in u.items():
@@ -594,53 +612,56 @@ class LateOracle(Oracle):
 
     # ------------------------------------------------------------------ leaders that move
 
-    def moving(self) -> None:
-        said, step = self.data["leaders"], self.witness("leaders")
-        self.require("messages" not in self.data and "mu1" not in self.gains, "leaders: what it needs")
+    def tracked(self) -> None:
+        """Motions of followers that hear at once of leaders that move, and what is stated of their inputs."""
         self.require(self.single and self.follow, "leaders: groups")
         if self.false:
             return
-        a, u = number(step["numbers"]["a"]), self.by_follower(step["witness"]["u"])
-        speed, delta, initial, after = (number(said[key]) for key in ("speed", "disturbance", "initial", "after"))
-        sign = None if said["sign_gain"] is None else number(said["sign_gain"])
-        T, rho1, k = self.gain
-        self.require(speed >= 0 and delta >= 0 and a > 0 and min(u.values()) > 0, "leaders: signs")
-        self.require(sign is None or sign >= speed + delta, "sign_gain")
-        if self.false:
-            return
-        push, p, least = speed + delta, a * k, min(u.values())
-        inputs = None if said["input"] is None else self.vector(said["input"])
+        inputs = None if self.said["input"] is None else self.vector(self.said["input"])
+        least = [Fraction(0)] * self.n if inputs is None else None
+        for i, entry in enumerate(self.said["rows"]):
+            step = self.witness(f"messages.rows[{i}]")
+            b, u = number(step["numbers"]["b"]), self.by_follower(step["witness"]["u"])
+            bounds = self.uncapped(entry, b, u) if self.cap is None and inputs is not None else None
+            if bounds is not None:
+                least = bounds if least is None else [min(pair) for pair in zip(least, bounds, strict=True)]
+            for x0, _ in self.starts():
+                self.in_motion(x0, np.array([float(u[v]) for v in self.follow]), float(b), entry, inputs)
+        if self.cap is None:
+            self.require(least is not None, "leaders: an input that may grow")
+            for v in self.follow if least is not None else ():
+                self.require(inputs is None or inputs[v] >= least[v], f"leaders: input of {v}")
+
+    def uncapped(self, entry: Json, b: Fraction, u: dict[int, Fraction]) -> list[Fraction] | None:
+        """What a row proves of inputs without a cap; None where these may grow."""
+        (T, rho1, k), p = self.gain, b * self.gain[2]
+        if p < 1 or (p == 1 and self.push):
+            return None
+        y = (rho1 + k / T) * number(entry["initial"])
+        y += self.push / min(u.values()) * (rho1 * T + k) / (p - 1) if self.push else 0
+        found = [Fraction(0)] * self.n
         for v, x in u.items():
             heard = sum((w * u[s] for s, w in self.among[v]), Fraction(0))
-            self.require(self.L[v][v] * x - heard >= a * x, f"leaders: row {v}")
-            self.require(initial * x >= self.far(v), f"leaders: initial of {v}")
-            if inputs is not None:
-                y = (rho1 + k / T) * initial
-                self.require(p > 1 or (p == 1 and sign is not None), "leaders: input")
-                if sign is None and p > 1:
-                    y += push / least * (rho1 * T + k) / (p - 1)
-                bound = (self.L[v][v] * x + heard) * y + (sign or 0)
-                self.require(inputs[v] >= bound, f"leaders: input of {v}")
-        self.require(after == 0 if sign is not None else after >= push / (a * rho1 * least), "leaders: after")
-        for x0, _ in self.starts():
-            self.tracked(x0, np.array([float(u[v]) for v in self.follow]), float(a), inputs)
+            found[v] = (self.L[v][v] * x + heard) * y + (self.sign or 0)
+        return found
 
-    def tracked(self, x0: np.ndarray, u: np.ndarray, a: float, inputs: Any) -> None:
-        said, (T, rho1, k) = self.data["leaders"], map(float, self.gain)
-        speed, delta, initial, after = (
-            float(number(said[key])) for key in ("speed", "disturbance", "initial", "after")
-        )
-        sign = None if said["sign_gain"] is None else float(number(said["sign_gain"]))
+    def in_motion(self, x0: np.ndarray, u: np.ndarray, b: float, entry: Json, inputs: Any) -> None:
+        T, rho1, k = map(float, self.gain)
+        assert self.fled is not None
+        initial, left, after = (float(number(entry[key])) for key in ("initial", "left", "after"))
+        sign = None if self.sign is None else float(self.sign)
         L = np.array([[float(x) for x in row] for row in self.L])
         leaders = [v for v in range(self.n) if v not in self.follow]
-        gain = Gain(T, rho1, k)
-        motion, p, layer = Moving(L, leaders, self.follow, gain, speed, delta), a * k, 0.0
+        gain = Gain(T, rho1, k, math.inf if self.cap is None else float(self.cap))
+        motion, layer = Moving(L, leaders, self.follow, gain, *map(float, self.fled)), 0.0
         if sign is None:
             times = late_motion.grid(T, T / 60, 1e-5, 200)
             X, aims = motion.run(x0, times, u)
+            begin = X[:, -1].copy()
+            if self.cap is None:
+                begin[self.follow] = motion.targets @ x0[leaders]
+                begin[leaders] = x0[leaders]
             later = np.linspace(T, 2 * T, 60)
-            begin = x0.copy()
-            begin[self.follow] = motion.targets @ x0[leaders]
             more = motion.run(begin, later, u)
             times, X, aims = np.append(times, later), np.hstack([X, more[0]]), np.hstack([aims, more[1]])
         else:
@@ -648,18 +669,16 @@ class LateOracle(Oracle):
             times, X, aims = motion.run_sign(x0, u, sign, layer)
         m = (np.abs(X[self.follow] - aims) / u[:, None]).max(axis=0)
         # with a sign gain the last thousandth before T is left out, and what it would take away stays
-        skipped = 0.0 if sign is None else initial * math.exp(-a * gain.clock(T * (1 - 2.5e-3)))
-        for t, seen, x in zip(times, m, X.T, strict=True):
+        skipped = 0.0 if sign is None else initial * math.exp(-b * gain.clock(T * (1 - 2.5e-3)))
+        early = times[times < T]
+        drift = float(self.push) / u.min() * self.drifted(Fraction(b), gain, early)
+        for j, (t, seen, x) in enumerate(zip(times, m, X.T, strict=True)):
             if t >= T:
-                kept = max(layer / (a * u.min()), skipped)
-                self.require(seen <= (after + kept) * 1.01 + FLOOR, f"leaders: after, at {t}")
+                kept = max(layer / (b * u.min()), skipped)
+                self.require(seen <= (initial * left + after + kept) * 1.01 + FLOOR, f"leaders: after, at {t}")
                 continue
-            bound = initial * math.exp(-a * gain.clock(t))
-            left = (T - t) / T
-            if sign is None:
-                way = (T - t) * (1 - left ** (p - 1)) / (p - 1) if p != 1 else (T - t) * math.log(1 / left)
-                bound += (speed + delta) / u.min() * way
-            allowed = max(bound, layer / (a * u.min())) * (1 + 1e-6) + FLOOR + (0.01 * bound if sign is not None else 0)
+            bound = initial * math.exp(-b * gain.clock(t)) + drift[j]
+            allowed = max(bound, layer / (b * u.min())) * (1 + 1e-6) + FLOOR + (0.01 * bound if sign is not None else 0)
             self.require(seen <= allowed, f"leaders: a motion at {t}: {seen} above {bound}")
             if inputs is not None:
                 e = gain.value(t) * np.abs(L @ x)[self.follow] + (sign or 0)

@@ -279,7 +279,8 @@ def late(draw: Draw) -> tuple[int, list[str], dict[str, str]]:
         when += ["--period", draw.number(1e-3, 0.05), *draw.sometimes(0.5, "--packet-loss", str(draw.randint(0, 4)))]
     command += when + draw.sometimes(0.3 if way < 0.75 else 0.9, "--gain-cap", draw.number(2, 50))
     command += draw.sometimes(0.3, "--own-delay") if "--gain-cap" in command else []
-    command += draw.sometimes(0.25, "--leader-speed", draw.number(0.01, 2)) if way < 0.6 else []
+    if way < 0.6 and draw.random() < 0.25:
+        command += ["--leader-speed", draw.number(0.01, 2), *draw.sometimes(0.3, "--sign-gain", draw.number(1, 5))]
     command += draw.sometimes(0.25, "--max-residual", draw.number(1e-6, 1))
     return graph.n_nodes, command, {"g.csv": text_of(graph, delays)}
 
@@ -292,6 +293,7 @@ def leaders(draw: Draw) -> tuple[int, list[str], dict[str, str]]:
     speed = draw.number(0.01, 2)
     command += ["--leader-speed", speed, *draw.sometimes(0.3, "--delta", draw.number(0.01, 1))]
     command += draw.sometimes(0.3, "--sign-gain", draw.number(0.1, 5))
+    command += draw.sometimes(0.3, "--gain-cap", draw.number(2, 50))
     return graph.n_nodes, command, {"g.csv": text_of(graph)}
 
 
@@ -305,11 +307,11 @@ def beside(draw: Draw) -> tuple[int, list[str], dict[str, str]]:
     if late:
         command += draw.choice([["--delay", draw.number(1e-4, 0.2)], ["--quantisation", draw.number(1e-3, 1)]])
         command += draw.sometimes(0.3, "--period", draw.number(1e-3, 0.05), "--packet-loss", str(draw.randint(0, 4)))
-        command += draw.sometimes(0.5, "--gain-cap", draw.number(2, 50))
         command += draw.sometimes(0.25, "--max-residual", draw.number(1e-6, 1))
+    command += draw.sometimes(0.5, "--gain-cap", draw.number(2, 50))
     if not late or draw.random() < 0.4:
         command += ["--leader-speed", draw.number(0.01, 2), *draw.sometimes(0.3, "--delta", draw.number(0.01, 1))]
-        command += [] if late else draw.sometimes(0.3, "--sign-gain", draw.number(0.1, 5))
+        command += draw.sometimes(0.3, "--sign-gain", draw.number(0.1, 5))
     return family.n_nodes, command, files
 
 

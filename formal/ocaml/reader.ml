@@ -17,10 +17,10 @@ let keys = [ "schema"; "producer"; "graph"; "structure"; "claim"; "protocol"; "p
    others, which keep their meaning: named, and not believed, with their obligations *)
 let not_read = [ "boxes", "a certificate of a family";
   "restricted", "a certificate of a family"; "formation", "single integrators in a formation" ]
-let besides = [ "messages", "messages that are late, lost or rounded, and of leaders that move beside them"; "leaders", "leaders that move" ]
+let besides = [ "messages", "messages that are late, lost or rounded, and of leaders that move" ]
 (* kinds of obligations and what they are of have these letters alone: what is printed of them can be no other line *)
 let named = String.for_all (function 'a' .. 'z' | '0' .. '9' | '-' | '.' | '[' | ']' -> true | _ -> false)
-let of_besides kind = kind = "tracking" || (String.length kind > 5 && String.sub kind 0 5 = "late-")
+let of_besides kind = String.length kind > 5 && String.sub kind 0 5 = "late-"
 
 let graph v =
   let get = fields "graph" [ "nodes"; "edges"; "read"; "sha256" ] v in

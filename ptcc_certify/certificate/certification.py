@@ -172,7 +172,7 @@ def certify_case(
     Certificate
     """
     origins = origins_of(case.graph, case.initial) | dict(origins or {})
-    case = with_vehicles(case.with_plain_agents())
+    case = with_vehicles(case.with_plain_agents()).with_leaders_heard()
     _refuse_before_reading(case)
     progress, family = listener(progress), _read_family(case)
     graph = as_graph(case.graph) if family is None else family.modes[0].mandatory

@@ -10,7 +10,6 @@ from typing import Any
 from lmi.exact.elementary_enclosures import rounded
 from ptcc_certify.bounds.delay.late_messages import late_obligations, messages_section
 from ptcc_certify.bounds.input.effort import EnergyIntegral, Peak, effort_section, peak_witness
-from ptcc_certify.bounds.tracking import leaders_section, tracking_obligations
 from ptcc_certify.certificate.checking import record
 from ptcc_certify.certificate.constrained_switching.claims import Claim
 from ptcc_certify.certificate.constrained_switching.sections import ball, claim_section, claim_steps
@@ -49,7 +48,6 @@ from ptcc_certify.checker.family_rows import FamilyFunctionsSection
 from ptcc_certify.checker.final_state import FormationSection, InfluenceSection
 from ptcc_certify.checker.input import EnergyWitness, InputSection
 from ptcc_certify.checker.late_messages import MessagesSection
-from ptcc_certify.checker.leaders import LeadersSection
 from ptcc_certify.checker.obligations import CheckReport
 from ptcc_certify.checker.protocol import ReachingTimes, SlidingPart
 from ptcc_certify.checker.rates import OvershootSection, RatesSection
@@ -159,8 +157,6 @@ def _sections_beside(proof: Proof, out: Writer) -> dict[str, Any]:
     sections: dict[str, Any] = {}
     if proof.late is not None and proof.late.says_something:
         sections["messages"] = write(MessagesSection, messages_section(proof.late), out)
-    if proof.tracking is not None:
-        sections["leaders"] = write(LeadersSection, leaders_section(proof.tracking), out)
     return sections
 
 
@@ -230,7 +226,6 @@ def _steps(proof: FamilyProof, out: Writer) -> Iterator[Obligation]:
     for k, claim in enumerate(proof.restricted):
         yield from claim_steps(f"restricted[{k}]", claim, _labels(proof, claim))
     yield from late_obligations(proof.late)
-    yield from tracking_obligations(proof.tracking)
 
 
 def _means(proof: FamilyProof) -> list[Any] | None:

@@ -183,7 +183,7 @@ class Evidence(OfQuestion, Shown):
             values |= {"searched_functions": search.functions, "search": replace(search, functions=())}
         if values.keys() & {"protocol", *_STATES}:
             values.setdefault("trajectory", None)
-            values |= {"late": values.get("late"), "tracking": values.get("tracking")}
+            values |= {"late": values.get("late")}
         if values.keys() & _STATES and "final_state" not in values and isinstance(proof, GraphProof):
             x0, sigma0 = (values.get(name, getattr(question, name)) for name in ("initial_state", "sigma0"))
             first = x0 and [x - s for x, s in zip(x0, sigma0 or [0] * len(x0), strict=True)]
@@ -295,10 +295,16 @@ class Evidence(OfQuestion, Shown):
         if isinstance(proof, FamilyProof) or proof.initial_state is None:
             return None
         try:
-            late, tracking = proof.late, proof.tracking
+            late, start = proof.late, [float(x) for x in proof.initial_state]
+            if late is not None and late.tracks:
+                from ptcc_certify.simulation.moving_leaders import simulate_tracking  # it loads SciPy
+
+                u, cap = (late.rows[0].witness.u if late.rows else None), late.messages.gain_cap
+                assert late.leaders is not None
+                run: Trajectory = simulate_tracking(proof.graph, proof.protocol, late.leaders, start, u=u, gain_cap=cap)
+                return self._in_places(run)
             if late is not None and not can_run(proof.protocol, late.messages):
                 return None
-            start = [float(x) for x in proof.initial_state]
             if late is not None and late.tracking_protocol is not None:
                 from ptcc_certify.simulation.virtual_positions import follow, run_virtual_positions
 
@@ -306,12 +312,7 @@ class Evidence(OfQuestion, Shown):
                 virtual = run_virtual_positions(proof.graph, proof.protocol, late.messages, start, late.leaders)
                 return follow(virtual, late.tracking_protocol, late.messages.vehicles.v0)
             if late is not None:
-                run: Trajectory = simulate_late(proof.graph, proof.protocol, late.messages, start, leaders=late.leaders)
-                return self._in_places(run)
-            if tracking is not None:
-                from ptcc_certify.simulation.moving_leaders import simulate_tracking  # it loads SciPy
-
-                run = simulate_tracking(proof.graph, proof.protocol, tracking.leaders, start, u=tracking.witness.u)
+                run = simulate_late(proof.graph, proof.protocol, late.messages, start, leaders=late.leaders)
                 return self._in_places(run)
             if len(proof.limits) != 1 or not proof.direct:
                 return None

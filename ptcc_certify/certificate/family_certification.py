@@ -6,7 +6,6 @@ A family of one mode with known weights is a graph, and :func:`ptcc_certify.cert
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any
@@ -14,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from lmi import search_time as deadline
-from lmi.errors import NoCertificate
 from lmi.exact.decimal_rounding import counted
 from lmi.search_time import share_of_time
 from ptcc_certify.bounds.delay.case import LateCase
@@ -22,7 +20,6 @@ from ptcc_certify.bounds.delay.late_messages import bound_late
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.bounds.final_state.attracting_box import AttractingBox, box_of_family
 from ptcc_certify.bounds.final_state.kept_means import with_means
-from ptcc_certify.bounds.tracking import bound_tracking
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.constrained_switching.claims import RateClaim
 from ptcc_certify.certificate.constrained_switching.search import STEP, claims_for, require_nominal
@@ -138,20 +135,15 @@ def certify_family(
 
 def _beside(proof: FamilyProof) -> dict[str, Any]:
     """Return what is proved for every signal where messages are late, or leaders move."""
-    messages, leaders, state = proof.request.messages, proof.request.leaders, proof.initial_state
-    if messages is None and leaders is None:
+    messages, state = proof.request.messages, proof.initial_state
+    if messages is None:
         return {}
     if not proof.direct:
         raise ParameterError("sigma0", "late messages ask for 0, so that no sliding variable moves; leave it out")
     known = [pair for pair in proof.final_state or () if pair is not None]
     middles = [((low + high) / 2, (high - low) / 2) for low, high in known]
     ends = middles if len(known) == proof.family.n_nodes else None
-    if messages is not None:
-        return {"late": bound_late(LateCase(proof.family, proof.protocol, messages, state, ends, leaders))}
-    with suppress(NoCertificate):
-        assert leaders is not None
-        return {"tracking": bound_tracking(proof.family, proof.protocol, leaders, state, ends)}
-    return {}
+    return {"late": bound_late(LateCase(proof.family, proof.protocol, messages, state, ends, proof.request.leaders))}
 
 
 def _fewer_functions(certificate: Certificate) -> Certificate:

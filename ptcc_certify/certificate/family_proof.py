@@ -196,11 +196,6 @@ class FamilyProof(Proof):
         return self.request.signal
 
     @property
-    def leaders_move(self) -> bool:
-        """Whether leaders move where it is told what is proved beside the claim."""
-        return self.asked_leaders is not None
-
-    @property
     def checkable(self) -> bool:
         """Whether every behaviour is decided, and takes few enough rows to be written."""
         return all(part.certifiable for part in self.parts)
@@ -220,9 +215,7 @@ class FamilyProof(Proof):
         With late messages what is left, while leaders move how they are tracked.
         """
         if self.late is not None:
-            return "late" if self.late.rows else "graph"
-        if self.leaders_move:
-            return "graph" if self.tracking is None else "tracking"
+            return "graph" if not self.late.rows else "tracking" if self.late.tracks else "late"
         nothing = self.initial_state is not None and not np.isfinite(self.deviation_bound([0.5])).any()
         return "states" if nothing else "decay"
 
@@ -488,8 +481,7 @@ class FamilyProof(Proof):
     def deviation_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
         """Bound of ``|x_k(t) - x_k(T)|`` for every agent and every signal, as :meth:`input_bound` bounds the input.
 
-        With nothing late, leaders at rest and an unlimited gain; otherwise, and of vehicles, ``late`` and ``tracking``
-        tell.
+        With nothing late, leaders at rest and an unlimited gain; otherwise, and of vehicles, ``late`` tells.
 
         Parameters
         ----------

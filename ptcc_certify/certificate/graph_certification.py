@@ -31,7 +31,6 @@ from ptcc_certify.bounds.final_state.of_graph import (
     influence_in_floats,
     takes_long,
 )
-from ptcc_certify.bounds.tracking import Tracking, bound_tracking
 from ptcc_certify.certificate.agents_part import AgentsPart, prove_agents, with_instants, with_phases
 from ptcc_certify.certificate.agents_request import (
     Chains,
@@ -113,7 +112,7 @@ def with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: b
 def with_small_delays(certificate: Certificate) -> Certificate:
     """Add what Lyapunov functions of the whole graph prove with late messages, and the longest delay that was asked."""
     late = certificate.proof.late
-    if late is None or late.messages.vehicles is not None:
+    if late is None or late.tracks or late.messages.vehicles is not None:
         return certificate
     proof = certificate.graph_proof
     case = replace(late.case, influence=proof.influence, forms=proof.decaying_forms)
@@ -189,7 +188,7 @@ class GraphSteps(OfQuestion):
             limit = self.upper_bound()
         matrix, result = self.final_state(trajectory)
         ends = stated_ends(matrix, result, self.initial_state)
-        late, tracking = self.late_messages(ends), self.tracking(ends)
+        late = self.late_messages(ends)
         proved = [rate_proof.rate, *(V.rate for V in search.functions)]
         proof = GraphProof(
             question=self.question,
@@ -201,7 +200,6 @@ class GraphSteps(OfQuestion):
             final_state=result,
             matrix=matrix,
             late=late,
-            tracking=tracking,
         )
         observed = Observations(
             trajectory=trajectory,
@@ -303,7 +301,7 @@ class GraphSteps(OfQuestion):
         return matrix, result
 
     def late_messages(self, ends: Sequence[Interval] | None) -> LateBounds | None:
-        """Bound what late messages leave at the deadline; None if nothing is asked of them."""
+        """Bound what late messages and moving leaders leave at the deadline; None if neither is asked."""
         messages = self.request.messages
         if messages is None:
             return None
@@ -317,17 +315,6 @@ class GraphSteps(OfQuestion):
             )
         leaders = self.request.leaders
         return bound_late(LateCase(self.structure, self.protocol, messages, self.initial_state, ends, leaders))
-
-    def tracking(self, ends: Sequence[Interval] | None) -> Tracking | None:
-        """Bound how followers track leaders that move; None if nothing is asked of that, or messages are late."""
-        leaders = self.request.leaders
-        if leaders is None or self.request.messages is not None:
-            return None
-        try:
-            return bound_tracking(self.structure, self.protocol, leaders, self.initial_state, ends)
-        except LMIError as error:
-            self.notes.append(f"moving leaders: {error}")
-            return None
 
 
 def _search_and_prove(

@@ -23,7 +23,6 @@ from ptcc_certify.bounds.input.effort import Effort
 from ptcc_certify.bounds.input.effort_bounds import InputRequest, bound_effort, full_constants
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
 from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
-from ptcc_certify.bounds.tracking import tracking_obligations
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.proof import Proof
 from ptcc_certify.checker import INPUT_NODES
@@ -255,7 +254,9 @@ class GraphProof(Proof):
             return "motion"
         if self.initial_state is None or self.final_state is None:
             return "decay"
-        return "tracking" if self.tracking is not None else "decay" if self.late is None else "late"
+        if self.late is None or (self.late.tracks and not self.late.rows):
+            return "decay"
+        return "tracking" if self.late.tracks else "late"
 
     @property
     def longest_way(self) -> float | None:
@@ -263,11 +264,6 @@ class GraphProof(Proof):
         if self.initial_state is None or self.final_state is None:
             return None
         return float(np.abs(np.array([float(x) for x in self.initial_state]) - np.asarray(self.final_state)).max())
-
-    @property
-    def leaders_move(self) -> bool:
-        """Whether leaders move where it is told what is proved beside the claim."""
-        return self.tracking is not None or (self.late is not None and self.late.leaders is not None)
 
     @cached_property
     def envelope(self) -> Envelope:
@@ -307,7 +303,7 @@ class GraphProof(Proof):
 
         Under the sliding-mode protocol it holds whatever the disturbance. It is of single integrators that hear each
         other at once, with leaders at rest and an unlimited gain; what of these was asked for otherwise, virtual
-        positions too, ``late`` and ``tracking`` bound.
+        positions too, ``late`` bounds.
 
         Parameters
         ----------
@@ -409,4 +405,4 @@ class GraphProof(Proof):
             obligations += self.effort.obligations
         if self.agents is not None:
             obligations += self.agents.obligations
-        return (*obligations, *late_obligations(self.late), *tracking_obligations(self.tracking))
+        return (*obligations, *late_obligations(self.late))

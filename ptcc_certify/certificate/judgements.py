@@ -12,7 +12,6 @@ from typing import Any
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.bounds.delay.certain_misses import Missed
 from ptcc_certify.bounds.delay.late_messages import LateBounds
-from ptcc_certify.bounds.tracking import Tracking
 from ptcc_certify.certificate.assessment import MET, OPEN, REFUTED, Answer
 from ptcc_certify.certificate.constrained_switching.claims import LastModeClaim
 from ptcc_certify.certificate.constrained_switching.reasons import reasons_for_none
@@ -109,7 +108,7 @@ def judge_input(proof: GraphProof, most: Fraction) -> Answer:
         return proof.agents.judge_input(most)
     if proof.constant:
         return Answer(MET, what)
-    if proof.late is not None or proof.tracking is not None or proof.asked_leaders is not None:
+    if proof.late is not None:
         return judge_input_beside(proof, most, what, _first_input(proof))
     least, bound = input_range(proof)
     if bound is not None and bound <= most:
@@ -249,9 +248,9 @@ def judge_messages(proof: GraphProof | FamilyProof) -> list[Answer]:
             answers.append(Answer(OPEN, proof.asked_messages.name, "nothing is proved of what is left at T"))
         elif most is not None:
             answers.append(Answer(OPEN, "max_residual", "no messages are late"))
-        if proof.asked_leaders is not None and proof.tracking is None:
-            answers.append(Answer(OPEN, "leaders that move", "no vector for their followers was found"))
         return answers
+    if not late.says_something and late.tracks:
+        return [Answer(OPEN, "leaders that move", "no vector for their followers was found")]
     if not late.says_something:
         limited = 0 < (late.longest_delay or 0) < math.inf
         limit = f"; this certificate's limit is a delay of {late.longest_delay:.3g}" if limited else ""
@@ -297,25 +296,23 @@ def judge_input_beside(proof: GraphProof | FamilyProof, most: Fraction, what: st
     first : Fraction or float
         What the largest ``|u_k(0)|`` is at least where nobody hears of anything wrong.
     """
-    late, tracking = proof.late, proof.tracking
-    other = late is not None and (late.messages.value_error or late.messages.vehicles is not None)
-    if first > most and not other:
+    late = proof.late
+    assert late is not None, "something is asked of late messages or of moving leaders"
+    if first > most and not late.messages.value_error and late.messages.vehicles is None:
         return Answer(REFUTED, what, f"it is up to {down(first)} at the start, proved")
-    if late is not None:
-        return _judge_late_input(proof, late, most, what)
-    return _judge_tracking(tracking, most, what)
+    return _judge_late_input(proof, late, most, what)
 
 
 def _judge_late_input(proof: GraphProof | FamilyProof, late: LateBounds, most: Fraction, what: str) -> Answer:
     """Tell whether every input stays within so much with late messages."""
     largest = largest_late_input(late, proof.protocol)
     if largest is None:
-        why = "no bound is proved with late messages"
+        why = f"no bound is proved {'while leaders move' if late.tracks else 'with late messages'}"
         if late.messages.vehicles is not None:
             why = "no bound is proved of virtual positions without a cap"
-        elif late.heard_right:
+        elif late.heard_right and not late.tracks:
             why = "not all who listen have rho2 kappa times their weights >= 1"
-        elif late.messages.gain_cap is None:
+        elif late.messages.gain_cap is None and not late.tracks:
             why += "; a gain without a cap makes ever more of what is left at T"
         return Answer(OPEN, what, why)
     if late.relative:
@@ -328,16 +325,6 @@ def largest_late_input(late: LateBounds, protocol: Protocol) -> Fraction | None:
     if late.inputs is None:
         return None
     return Fraction(float(late.inputs.max())) + (0 if protocol.reaching is None else protocol.reaching.mu1)
-
-
-def _judge_tracking(tracking: Tracking | None, most: Fraction, what: str) -> Answer:
-    """Tell whether every input stays within so much while leaders move."""
-    if tracking is None or tracking.input is None:
-        return Answer(OPEN, what, "no bound is proved while leaders move")
-    if tracking.relative:
-        what += " from within 1 of the targets"
-    largest = Fraction(float(tracking.input.max()))
-    return Answer(MET, what) if largest <= most else Answer(OPEN, what, f"proved: {up(largest)}")
 
 
 # ---------------------------------------------------------------------- families

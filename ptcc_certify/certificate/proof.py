@@ -10,12 +10,11 @@ from typing import Any
 
 from ptcc_certify.bounds.delay.late_messages import LateBounds
 from ptcc_certify.bounds.input.effort import Effort
-from ptcc_certify.bounds.tracking import Tracking
 from ptcc_certify.certificate.request import Expectations, Question, Request
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.model import Protocol
-from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.late_messages import AtOnce, LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.reaching_time import ReachingTime
 
@@ -143,9 +142,7 @@ class Proof(OfQuestion):
     reaching : tuple of N ReachingTime, or None
         When each sliding variable is proved to be 0, whatever the disturbance.
     late : LateBounds or None
-        What holds with late messages; None where nothing was asked of them.
-    tracking : Tracking or None
-        What holds while leaders move; None where nothing was asked of that.
+        What holds with late messages, and while leaders move; None where neither was asked.
     source : Source or None
         The file that it was read from.
     """
@@ -153,19 +150,23 @@ class Proof(OfQuestion):
     question: Question
     reaching: tuple[ReachingTime, ...] | None = None
     late: LateBounds | None = None
-    tracking: Tracking | None = None
     source: Source | None = None
 
     @property
     def asked_messages(self) -> LateMessages | None:
-        """How late messages are."""
-        return self.request.messages if self.late is None else self.late.messages
+        """How late messages are; None where they come at once and exactly."""
+        messages = self.request.messages if self.late is None else self.late.messages
+        return None if isinstance(messages, AtOnce) else messages
 
     @property
     def asked_leaders(self) -> MovingLeaders | None:
         """How leaders move."""
-        proved = (one.leaders for one in (self.late, self.tracking) if one is not None and one.leaders is not None)
-        return next(proved, self.request.leaders)
+        return self.request.leaders if self.late is None else self.late.leaders
+
+    @property
+    def leaders_move(self) -> bool:
+        """Whether leaders move."""
+        return self.asked_leaders is not None
 
     @property
     def velocities(self) -> Sequence[Fraction] | None:

@@ -10,7 +10,6 @@ from typing import Any
 from ptcc_certify.bounds.delay.late_messages import read_late
 from ptcc_certify.bounds.float_conversion import fractions
 from ptcc_certify.bounds.input.effort import read_effort
-from ptcc_certify.bounds.tracking import read_tracking
 from ptcc_certify.certificate.agents_part import read_agents
 from ptcc_certify.certificate.constrained_switching.sections import read_claim
 from ptcc_certify.certificate.evidence import Observations
@@ -65,7 +64,6 @@ def read_document(source: Source) -> tuple[GraphProof | FamilyProof, Observation
         "question": Question(subject, protocol, state, fractions(sections["sliding_variable"]), request),
         "reaching": read_reaching(sections.get("reaching_time"), protocol),
         "late": with_longest_delays(late, document["unverified"]),
-        "tracking": read_tracking(source.report, subject, protocol, relative),
         "source": replace(source, effort=effort),
     }
     if isinstance(subject, Family):

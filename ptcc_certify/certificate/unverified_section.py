@@ -11,11 +11,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ptcc_certify.bounds.delay.case import LateCase
+from ptcc_certify.bounds.delay.case import LateCase, read_leaders
 from ptcc_certify.bounds.delay.late_messages import LateBounds, delays, read_messages
 from ptcc_certify.bounds.envelope import FRACTIONS, LAST_INSTANTS
 from ptcc_certify.bounds.input.effort import LIMITS, Effort
-from ptcc_certify.bounds.tracking import asked_leaders, read_leaders
 from ptcc_certify.certificate.constrained_switching.sections import read_signals, signals_section
 from ptcc_certify.certificate.evidence import Evidence, Observations
 from ptcc_certify.certificate.family_proof import FamilyProof
@@ -24,7 +23,6 @@ from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.certificate.section_io import Writer, finite, readable, text, write
 from ptcc_certify.checker.constrained_switching import Dwell, Shares, Windows
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
-from ptcc_certify.checker.leaders import LeadersAsked
 from ptcc_certify.checker.messages_asked import Delays
 from ptcc_certify.checker.reading import RejectedError, entries, exact, need
 from ptcc_certify.checker.section_declarations import Context, read
@@ -119,15 +117,9 @@ def _member(quotient: Quotient, entry: Mapping[str, Any]) -> Member:
 
 def write_unproved(proof: GraphProof | FamilyProof) -> dict[str, Any]:
     """Return the late messages or moving leaders that were asked for where nothing is proved of them."""
-    messages, leaders, late = proof.asked_messages, proof.asked_leaders, proof.late
-    if (late is not None and late.says_something) or proof.tracking is not None:
+    if (late := proof.late) is None or late.says_something:
         return {}
-    asked: dict[str, Any] = {}
-    if messages is not None:
-        of = proof.graph if isinstance(proof, GraphProof) else proof.family
-        asked["messages"] = write(Delays, delays(messages, of), Writer(proof.labels))
-        del asked["messages"]["leaders"]
-    return asked if leaders is None else {**asked, "leaders": write(LeadersAsked, asked_leaders(leaders), Writer(()))}
+    return {"messages": write(Delays, delays(late.messages, late.case.of, late.leaders), Writer(proof.labels))}
 
 
 def read_unproved(document: Mapping[str, Any], structure: Structure | Family) -> dict[str, Any]:
@@ -136,13 +128,15 @@ def read_unproved(document: Mapping[str, Any], structure: Structure | Family) ->
     of = structure if isinstance(structure, Family) else structure.graph
     pairs = of.pairs[0].size if isinstance(of, Family) else of.n_edges
     at = Context(SideFiles(Path(), {}), of.labels, edges=pairs)
-    if not isinstance(asked, dict) or "messages" in document or "leaders" in document:
+    if not isinstance(asked, dict) or "messages" in document:
         return {}
+    section: Delays | None = readable(lambda: read(Delays, asked["messages"], at, "messages"))
+    if section is None:
+        return {}
+    moving = section.leaders
     return {
-        "messages": readable(
-            lambda: read_messages(read(Delays, asked["messages"] | {"leaders": None}, at, "messages"), structure)
-        ),
-        "leaders": readable(lambda: read_leaders(read(LeadersAsked, asked["leaders"], at, "leaders"))),
+        "messages": readable(lambda: read_messages(section, structure)),
+        "leaders": None if moving is None else readable(lambda: read_leaders(moving)),
     }
 
 

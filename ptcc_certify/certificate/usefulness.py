@@ -22,7 +22,6 @@ import numpy as np
 from lmi.exact.decimal_rounding import up
 from ptcc_certify.bounds.delay.late_messages import LateBounds
 from ptcc_certify.bounds.envelope import Envelope
-from ptcc_certify.bounds.tracking import Tracking
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.constrained_switching.bounds import deviation_of_signal
 from ptcc_certify.certificate.family_proof import FamilyProof
@@ -80,9 +79,7 @@ def use_of(proof: GraphProof | FamilyProof) -> Use:
     if proof.agents is not None:
         return _use_of_agents(proof.agents)
     if proof.late is not None:
-        return _use_of_late(proof.late, proof.longest_way)
-    if proof.tracking is not None:
-        return _use_of_tracking(proof.tracking)
+        return _use_of_tracking(proof.late) if proof.late.tracks else _use_of_late(proof.late, proof.longest_way)
     if isinstance(proof, FamilyProof):
         return _use_of_family(proof)
     if proof.effort is not None and proof.effort.residual:
@@ -249,18 +246,21 @@ def _use_of_late(late: LateBounds, longest_way: float | None) -> Use:
     return Use(way is not None and late.largest <= USEFUL * way, remark, caveat)
 
 
-def _use_of_tracking(tracking: Tracking) -> Use:
+def _use_of_tracking(late: LateBounds) -> Use:
     """Tell whether followers are nearer to their targets at ``0.99 T`` than a hundredth of what there was to go.
 
     That is what is proved at first, or how far the leaders may move by ``T`` if that is farther.
     """
-    first, last = (float(x) for x in tracking.distance_bound([1.0, 0.01]).max(axis=0))
-    relative = " from within 1 of it" if tracking.relative else ""
+    if not late.rows or late.leaders is None:
+        return Use(None)
+    T = float(late.case.protocol.T)
+    first, last = (float(x) for x in late.largest_bound([0.0, 0.99 * T]))
+    relative = " from within 1 of it" if late.relative else ""
     remark = f"every follower within {up(last, 2)} of its target at 0.99 T{relative}"
-    useful = last <= max(USEFUL * max(first, float(tracking.leaders.total * tracking.protocol.T)), _NOTHING)
-    if tracking.input is not None:
+    useful = last <= max(USEFUL * max(first, float(late.leaders.total) * T), _NOTHING)
+    if late.inputs is not None:
         return Use(useful, remark)
-    mend = Change("rho2", tracking.bounding_rho2)
+    mend = Change("rho2", late.bounding_rho2)
     return Use(useful, remark, "the input is not proved bounded", (mend, " bounds the input"))
 
 

@@ -36,7 +36,6 @@ from ptcc_certify.checker.final_state import check_final_state, check_formation
 from ptcc_certify.checker.graph import check_graph
 from ptcc_certify.checker.input import INPUT_NODES, Verified, check_input
 from ptcc_certify.checker.late_messages import check_messages
-from ptcc_certify.checker.leaders import check_leaders
 from ptcc_certify.checker.lyapunov import check_functions
 from ptcc_certify.checker.obligations import OBLIGATIONS, CheckReport, ProofObligation, VerifiedObligation
 from ptcc_certify.checker.protocol import (
@@ -218,12 +217,11 @@ def _verdict(doc: Document) -> str:
     check_sliding(doc, graph, protocol, begin)
     verified = Verified(structure, protocol, begin, final, functions, rate, bound)
     if "agents" in data:
-        need("messages" not in data and "leaders" not in data, "agents of order n with late messages or moving leaders")
+        need("messages" not in data, "agents of order n with late messages or moving leaders")
         return doc.close(check_agents(doc, verified))
     need("phases" not in data and "instants" not in data, "phases or instants of agents that are not of order n")
     check_input(doc, verified)
     check_messages(doc, verified, protocol, begin)
-    check_leaders(doc, structure, protocol, begin)
     return doc.close(data["influence"] is not None and (rate is not None or not graph.listening))
 
 
@@ -237,7 +235,6 @@ def _family_verdict(doc: Document, protocol: Protocol) -> str:
     check_boxes(doc, family, begin)
     check_restricted(doc, family, functions, protocol, begin)
     check_messages(doc, family, protocol, begin)
-    check_leaders(doc, family, protocol, begin)
     for key in NOT_OF_FAMILIES:
         doc.section(key)
     return doc.close(True)

@@ -31,7 +31,6 @@ from ptcc_certify.checker.graph import GraphSection
 from ptcc_certify.checker.input import EnergyWitness, InputSection, PeakWitness
 from ptcc_certify.checker.late_form import LateFormWitness
 from ptcc_certify.checker.late_messages import MessagesSection, StepsStart
-from ptcc_certify.checker.leaders import LeadersSection
 from ptcc_certify.checker.lyapunov import FunctionsSection
 from ptcc_certify.checker.missed_deadline import Signs
 from ptcc_certify.checker.protocol import NominalSection, ReachingTimes, SlidingSection
@@ -67,7 +66,6 @@ class AnyCertificate:
     digest: Sha256
     unverified: dict[str, Any]
     messages: MessagesSection | None = None
-    leaders: LeadersSection | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,7 +141,6 @@ BRINGS: dict[str, tuple[Brings, ...]] = {
     "late-settling": (Brings("q b", SettlingWitness),),
     "late-form": (Brings("q b kap", LateFormWitness),),
     "late-lmi": (Brings("b", LateLMIWitness),),
-    "tracking": (Brings("a", RowVector),),
     "agent-decrease": (Brings("rate"),),
     "agent-coupling": (Brings("coupling"),),
     "agent-cascade": (Brings("alpha"),),

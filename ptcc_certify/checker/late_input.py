@@ -52,16 +52,10 @@ class Inputs:
     values : Numbers
         By agent.
 
-    Raises
-    ------
-    RejectedError
-        The gain has no cap.
     """
 
     def __init__(self, doc: Document, messages: Messages, values: Numbers):
         doc.at = "messages.input"
-        if messages.gain_cap is None:
-            raise RejectedError("input without a cap of the gain")
         self.messages, self.gain_cap = messages, messages.gain_cap
         self.stated = Stated("input", doc.context.labels, values)
         need(min(self.stated.values) >= 0, "an input is negative")
@@ -69,25 +63,38 @@ class Inputs:
     def by_rows(self, rows: Rows, decay: Decay) -> None:
         """Mark what is at least ``(2 D_k - b) u_k initial y + gain_cap (highest (D_k u_k + heard_k) + error D_k)``.
 
-        Since ``heard_k <= (D_k - b) u_k``, of any weights. Where these are uncertain, the largest are taken.
+        Since ``heard_k <= (D_k - b) u_k``, of any weights. Where these are uncertain, the largest are taken. Where
+        nothing is late ``(D_k u_k + heard_k)`` times what bounds ``gain m`` does, too; and ``sign_gain`` is added.
         """
-        followers, b = rows.followers, decay.b
+        followers, b, leaders = rows.followers, decay.b, self.messages.leaders
         (most, unit), (degrees, _) = rows.largest, followers.degrees
-        y = decay.initial * gain_above(self.messages.gain, self.gain_cap, b, decay.cap) / rows.scale
+        sign = (Fraction(0) if leaders is None else leaders.sign_gain or Fraction(0)), [1] * len(degrees)
+        self.stated.meet(followers.others)  # leaders that rest, or move as they like
+        falling = self.messages.falling_input(b, decay.initial, rows.least)
+        if falling is not None:
+            self.stated.meet(followers.nodes, (falling / (rows.scale * unit), most), sign)
+        if self.gain_cap is None:
+            return
+        y = decay.initial * self._gain_above(b, decay.cap) / rows.scale
         self.stated.meet(
             followers.nodes,
+            sign,
             (2 * y / unit, list(map(mul, degrees, rows.u))),
             (-b * y, rows.u),
             (self.gain_cap * decay.highest / (rows.scale * unit), most),
             (self.gain_cap * self.messages.wrong / unit, degrees),
         )
-        self.stated.meet(followers.others)  # leaders that rest
+
+    def _gain_above(self, b: Fraction, cap: Fraction | None = None) -> Fraction:
+        if self.gain_cap is None:
+            raise RejectedError("an input without a cap of the gain")
+        return gain_above(self.messages.gain, self.gain_cap, b, cap)
 
     def by_settling(self, structure: Structure, u: Numbers, b: Fraction, cap: Fraction) -> None:
         """Mark what is at least ``(2 D_k - b) u_k y`` of followers, ``(D_l u_l + heard_l) y`` of leaders."""
         graph = structure.graph
         values, scale = u.over(range(graph.n))
-        y, heard = gain_above(self.messages.gain, self.gain_cap, b, cap) / scale, graph.sums_in(values)
+        y, heard = self._gain_above(b, cap) / scale, graph.sums_in(values)
         sent = list(map(mul, graph.diagonal, values))
         of_followers = ([column[v] for v in structure.followers] for column in (sent, values))
         self.stated.meet(structure.followers, *zip((2 * y / graph.unit, -b * y), of_followers, strict=True))
@@ -97,7 +104,7 @@ class Inputs:
     def by_form(self, phi: Sequence[Fraction], b: Fraction, root: Fraction) -> None:
         """Mark what is at least ``phi_k sqrt(V(0)) y``."""
         (values,), scale = integers([phi])
-        y = root * gain_above(self.messages.gain, self.gain_cap, b)
+        y = root * self._gain_above(b)
         self.stated.meet(range(len(values)), (y / scale, values))
 
     def close(self, doc: Document) -> None:

@@ -1,4 +1,4 @@
-"""Verifies what holds where messages are late, get lost or are rounded: section 22 of the format."""
+"""Verifies what holds where messages are late, get lost or are rounded, or leaders move: section 22 of the format."""
 
 from __future__ import annotations
 
@@ -115,12 +115,12 @@ def check_messages(doc: Document, of: Verified | Family, protocol: Protocol, beg
     if isinstance(of, Family):
         doc.context.edges = len(of.pairs)
     section = doc.section("messages")
-    need("leaders" not in doc.data, "leaders that move beside late messages stand under messages")
     need(begin.sigma is None or not any(begin.sigma.values), "late messages while sliding variables move")
     messages = read_messages(protocol.gain, section)
     if messages.leaders is not None:
         need(not protocol.sliding, "leaders that move under the sliding-mode protocol")
         need(all(getattr(section, key) is None for key in AT_REST), f"one of {', '.join(AT_REST)} though leaders move")
+        need(section.steps is None or messages.leaders.sign_gain is None, "steps beside a sign term")
     need(len(section.rows) <= MANY_ROWS, f"more than {MANY_ROWS} witnesses of rows")
     bounded = bool(section.rows) or section.steps is not None
     by_rows = bounded or section.missed is not None or section.staged is not None

@@ -29,15 +29,18 @@ class Moving:
     ----------
     speed, disturbance : Fraction
         Of every leader, and of every follower, at most.
+    sign_gain : Fraction or None
+        What followers add times ``sign(e_k)``: at least the sum of these.
     """
 
     speed: NotNegative
     disturbance: NotNegative
+    sign_gain: Fraction | None = None
 
     @property
     def push(self) -> Fraction:
-        """How fast a follower and its target may part."""
-        return self.speed + self.disturbance
+        """How fast a follower and its target may part; 0 where the sign term takes that up."""
+        return self.speed + self.disturbance if self.sign_gain is None else Fraction(0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +62,7 @@ class Messages:
     gain_cap : Fraction or None
         What the gain is capped at.
     leaders : Moving or None
-        How fast leaders move, and what disturbs the followers; None if they rest, and nothing does.
+        How fast leaders move, what disturbs the followers, and a sign term; None if they rest, and nothing does.
     """
 
     gain: PrescribedGain
@@ -79,6 +82,18 @@ class Messages:
     def wrong(self) -> Fraction:
         """What is heard differs from what is so by no more, deviations left out: targets move on while it is late."""
         return self.value_error + (self.leaders.speed * self.delay if self.leaders else 0)
+
+    def falling_input(self, b: Fraction, initial: Fraction, least: Fraction) -> Fraction | None:
+        """Bound ``gain m``, ``m' <= -b gain m + push/least`` from ``initial``, where nothing is late or off.
+
+        With ``p = b rho2 kappa`` at most ``gain(0) initial + push/least (rho1 T + rho2 kappa)/(p - 1)``, without the
+        push also where ``p = 1``, under a cap too; None where neither is known.
+        """
+        p, gain, push = b * self.gain.k, self.gain, Fraction(0) if self.leaders is None else self.leaders.push
+        if self.delay or self.value_error or p < 1 or (push and p == 1):
+            return None
+        most = self.least_gain() * initial
+        return most + push / least * (gain.rho1 * gain.T + gain.k) / (p - 1) if push else most
 
     def latency_of(self, edge: int) -> Fraction:
         """Return the latency of an edge, by its place among all."""
@@ -161,7 +176,11 @@ def read_messages(gain: PrescribedGain, section: Delays) -> Messages:
         age += (packets.losses + 1) * packets.period
     need(delay == age, "delay is not the largest age of what is heard")
     virtual = getattr(section, "vehicles", None) is not None
-    need(virtual or delay > 0 or section.value_error > 0, "nothing is late, and nothing is off")
+    leaders = section.leaders
+    need(virtual or leaders or delay > 0 or section.value_error > 0, "nothing is late or off, and leaders rest")
+    if leaders is not None and leaders.sign_gain is not None:
+        need(leaders.sign_gain >= leaders.speed + leaders.disturbance, "sign_gain is below speed + disturbance")
+        need(not virtual and section.own == "fresh", "a sign term of virtual positions, or of a late own state")
     late, cap = section.own == "late", section.gain_cap
     need(cap is not None or not late, "the own state is late, and the gain has no cap: the protocol diverges")
-    return Messages(gain, latency, delay, late, section.value_error, cap, section.leaders)
+    return Messages(gain, latency, delay, late, section.value_error, cap, leaders)

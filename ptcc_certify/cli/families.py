@@ -37,6 +37,7 @@ from ptcc_certify.model.constrained_switching import (
     DwellTime,
     JointWindows,
 )
+from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.model.refusals import NOT_OF_FAMILIES
 
@@ -284,6 +285,8 @@ def certify_family(
         origins = {"graph": Path(name).name, "read": read, **random_states}
         asks = Asks(time_limit=options["time_limit"], expectations=expected)
         beside: dict[str, Any] = {"messages": messages_of(graphs, family, options), "leaders": leaders_of(options)}
+        if beside["messages"] is None and beside["leaders"] is not None and options["gain_cap"] is not None:
+            beside["limits"] = GainLimits(gain_cap=options["gain_cap"])
         if beside["messages"] is not None and isinstance(beside["messages"].delay, Mapping):
             family = replace(family, notes=noted_delays(family.notes, options["delay"]))
         agents, begun = agents_and_states(options, family.modes[0].mandatory, certified=True)
@@ -335,7 +338,7 @@ def refuse_options(options: shared.Options) -> None:
     foreign = [*_NOT_OF_FAMILIES]
     if options["kind"] == "nominal":
         foreign += ["disturbance"] if asks_for_leaders(options) else ["disturbance", "delta"]
-    if asks_for_messages(options) or exchanges_virtual(options):
+    if asks_for_messages(options) or asks_for_leaders(options) or exchanges_virtual(options):
         foreign.remove("gain_cap")
     for name in foreign:
         given = source(name) in (ParameterSource.COMMANDLINE, ParameterSource.DEFAULT_MAP)

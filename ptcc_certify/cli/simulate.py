@@ -46,6 +46,7 @@ from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.lazy_report import rendered
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.case import Case
+from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.model.run import Run
 
@@ -214,8 +215,6 @@ def _run_beside(
     source = click.get_current_context().get_parameter_source
     name = "late messages" if messages else "leaders that move"
     refused = ["steps", "boundary_layer", "noise", "stop_before", "sample_period"]
-    if messages is None:
-        refused.append("gain_cap")
     if protocol.reaching is None:
         refused += ["delta", "disturbance"] if leaders is None else ["disturbance"]
     given = [option for option in refused if options[option] is not None]
@@ -228,7 +227,10 @@ def _run_beside(
     sigma0 = shared.sigma0_of(protocol, options, signed)
     x0 = shared.read_initial_state(options["x0"], options["seed"], signed)
     more: Any = {"messages": messages, "leaders": leaders}
-    more |= {} if messages is None else {"signal": (options["age_pattern"], options["seed"])}
+    if messages is not None:
+        more["signal"] = (options["age_pattern"], options["seed"])
+    elif options["gain_cap"] is not None:
+        more["actuator"] = GainLimits(gain_cap=options["gain_cap"])
     return run_in_places(signed, protocol, x0, places, sigma0=sigma0, **more)
 
 

@@ -15,7 +15,7 @@ from ptcc_certify.model.base import Protocol
 from ptcc_certify.model.constrained_switching import SignalClass
 from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.initial_state import InitialState
-from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.late_messages import AtOnce, LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
 
 
@@ -100,6 +100,19 @@ class Case:
         if self.agents.cap is None:
             return replace(self, agents=None)
         return self if self.sliding else replace(self, agents=None, limits=self.limits_with(self.agents))
+
+    def with_leaders_heard(self) -> Case:
+        """Return the case, where leaders move, with messages that come at once if nothing else is told of them.
+
+        Then a cap of the gain is that of these messages.
+        """
+        if self.leaders is None or self.messages is not None:
+            return self
+        caps = {entry.gain_cap for entry in self.limits}
+        alone = all(entry.stop_before is None and entry.sample_period is None for entry in self.limits)
+        if len(caps) > 1 or not alone:
+            return self
+        return replace(self, messages=AtOnce(gain_cap=next(iter(caps), None)), limits=())
 
     def limits_with(self, agents: Agents) -> tuple[Limits, ...]:
         """Return the limits of the gain with the cap of agents, if they have one."""

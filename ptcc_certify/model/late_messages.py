@@ -77,6 +77,8 @@ lambda of L, or measure the own state without delay
     """
 
     section: ClassVar = "messages"
+    #: Whether something must be late, lost or rounded.
+    flawed: ClassVar = True
     delay: Exact | Mapping[tuple[str, str], Exact] = option(
         "--delay D|COLUMN",
         "What agents hear is up to D late; or the column of the edge list that tells the delay of every edge.",
@@ -144,7 +146,7 @@ lambda of L, or measure the own state without delay
         if self.vehicles is not None and not hasattr(self.vehicles, "v0"):
             what = f"= {shorten(repr(self.vehicles))} are none"
             raise ParameterError("vehicles", f'{what}; ask for Agents(order=2, exchange="virtual") instead')
-        if self.exact and self.vehicles is None:
+        if self.flawed and self.exact and self.vehicles is None:
             raise ParameterError(
                 "messages that are neither late, nor lost, nor rounded; give delay, period or value_error above 0"
             )
@@ -242,6 +244,21 @@ lambda of L, or measure the own state without delay
         if self.gain_cap is not None:
             fields.append(f"gain_cap={readable(self.gain_cap)}")
         return f"LateMessages({', '.join(fields)})"
+
+
+class AtOnce(LateMessages):
+    """Messages that are neither late, nor lost, nor rounded, of which leaders that move are heard.
+
+    Examples
+    --------
+    >>> AtOnce(gain_cap=9)
+    AtOnce(gain_cap=9)
+    """
+
+    flawed: ClassVar = False
+
+    def __repr__(self) -> str:
+        return f"AtOnce({'' if self.gain_cap is None else f'gain_cap={readable(self.gain_cap)}'})"
 
 
 def _read(delays: Mapping[Any, Any]) -> dict[Any, Fraction]:

@@ -46,12 +46,13 @@ _NOT_LATE = {
     "delta": "is not proved of late messages under the nominal protocol by itself; give leaders with it, of speed 0 if "
     "they rest, or take the sliding-mode protocol, under which disturbances within delta move nothing",
 }
-_UNLIMITED = "leaders that move are tracked at T by a gain without limits; leave it out"
+_CAPPED = "followers of leaders that move are certified under one gain cap alone; leave it out"
 #: What is not certified beside leaders that move.
 _NOT_TRACKING = {
     "initial_set": _NO_SET,
-    **dict.fromkeys(("gain_cap", "stop_before", "sample_period"), _UNLIMITED),
-    "noise": "is not proved while leaders move; leave it out",
+    **dict.fromkeys(("gain_cap", "stop_before", "sample_period"), _CAPPED),
+    "noise": "while leaders move an error of values tells it: noise within NU is one of 2 NU, a quantisation of 4 NU; "
+    "give that instead",
     "delta": "of leaders that move MovingLeaders(disturbance=..) tells what disturbs the followers; give that instead",
 }
 _NOT_TOGETHER = _NOT_LATE | {"delta": _NOT_TRACKING["delta"]}
@@ -175,14 +176,14 @@ def refuse_beside(structure: Structure, case: Case) -> None:
     _refuse_beside_any_graph(case)
     if messages is None and leaders is None:
         return
-    together = messages is not None and leaders is not None
-    _refuse_more(_NOT_TOGETHER if together else _NOT_TRACKING if messages is None else _NOT_LATE, case)
+    late = messages is not None and (messages.flawed or messages.vehicles is not None)
+    _refuse_more(_NOT_LATE if leaders is None else _NOT_TOGETHER if late else _NOT_TRACKING, case)
     if leaders is not None:
         refuse_leader_groups(structure, "leaders that move as they like: a bound")
     if messages is not None:
         _refuse_messages(structure, messages, [limit.gain_cap for limit in case.limits])
     if structure.graph.n_edges == 0:
-        name, why = ("leaders", "nobody tracks") if messages is None else ("messages", "nothing is late")
+        name, why = ("messages", "nothing is late") if late else ("leaders", "nobody tracks")
         if messages is not None and messages.vehicles is not None and messages.exact:
             name, why = "exchange", "no virtual positions are exchanged"
         raise ParameterError(name, f"nobody listens to anybody, so {why}; leave it out")
@@ -218,19 +219,17 @@ def refuse_together(messages: LateMessages | None, leaders: MovingLeaders | None
     Raises
     ------
     ParameterError
-        Followers have a sign term, or their own states are late.
+        The own states of followers are late.
 
     Examples
     --------
-    >>> refuse_together(LateMessages(delay=1), MovingLeaders(speed=1, sign_gain=1))
+    >>> refuse_together(LateMessages(delay=1, own_delay=True, gain_cap=1), MovingLeaders(speed=1))
     Traceback (most recent call last):
-    ptcc_certify.errors.ParameterError: sign_gain: nothing is proved of a sign term where messages are late; leave it \
-out
+    ptcc_certify.errors.ParameterError: own_delay: an own state that is late is certified of leaders at rest alone; \
+leave one of the two out
     """
     if messages is None or leaders is None:
         return
-    if leaders.sign_gain is not None:
-        raise ParameterError("sign_gain", "nothing is proved of a sign term where messages are late; leave it out")
     if messages.own_delay:
         raise ParameterError(
             "own_delay", "an own state that is late is certified of leaders at rest alone; leave one of the two out"

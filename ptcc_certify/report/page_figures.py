@@ -110,8 +110,7 @@ def draw(
         there["final"] = n > DRAWN_NODES and saved.proof.final_state is not None
         there["degrees"] = n > DRAWN_NODES and saved.graph_proof.graph.n_edges > 0
     if saved.initial_state is not None and n <= EXACT_NODES:
-        there["late"] = saved.proof.late is not None and _late_is_drawn(saved.proof.late, saved.protocol)
-        there["tracking"] = saved.proof.tracking is not None
+        there |= _beside(saved.proof.late, saved.protocol)
     if run is not None:
         slid = run.sliding is not None
         there["states"] = n <= TRACED_NODES and not saved.proof.constant
@@ -154,8 +153,8 @@ def _draw_family(
     small = bool(runs) and proof.family.n_nodes <= TRACED_NODES
     there = {"graph": proof.family.n_nodes <= DRAWN_NODES, "states": small, "input": small}
     there["decay"] = bool(runs) and proof.common and proof.rate is not None
-    there["late"] = proof.late is not None and bool(proof.late.rows)
-    there["tracking"] = proof.tracking is not None
+    if proof.late is not None and proof.late.rows:
+        there["tracking" if proof.late.tracks else "late"] = True
     figures = _figures(saved, [name for name in wanted if there.get(name)], runs)
     for number, (_, _, component, one) in enumerate(why):
         try:
@@ -184,9 +183,11 @@ def counterexamples(saved: Certificate) -> Counterexamples:
     return [(what, set_text(counterexample_text(c, why, labelled)), c, why) for what, c, why in result]
 
 
-def _late_is_drawn(late: LateBounds, protocol: Protocol) -> bool:
-    """Tell whether there are runs with late messages under something that was proved."""
-    return late.says_something and can_run(protocol, late.messages)
+def _beside(late: LateBounds | None, protocol: Protocol) -> dict[str, bool]:
+    """Tell which figure of late messages or moving leaders there is: of runs under something that was proved."""
+    if late is None or not late.says_something:
+        return {}
+    return {"tracking": True} if late.tracks else {"late": can_run(protocol, late.messages)}
 
 
 def inline_figure(figure: Figure, name: str, caption: Markup) -> Markup:

@@ -275,6 +275,8 @@ class _Fleeing:
         from ptcc_certify.simulation.worst_leaders import WorstLeaders  # it loads SciPy
 
         refuse_together(messages, leaders)
+        if leaders.sign_gain is not None:
+            raise ParameterError("sign_gain", "is not simulated where messages are late; leave it out")
         self.worst, self.t = WorstLeaders(analyse(graph), protocol, leaders), t
         gain = GainLimits(gain_cap=messages.gain_cap).limit(protocol.gain).value(t, np.maximum(1 - t / t[-1], 0))
         gain[-1] = np.inf if messages.gain_cap is None else float(messages.gain_cap)

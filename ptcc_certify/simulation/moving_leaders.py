@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,8 @@ from ptcc_certify.graphs.io import as_graph, as_state
 from ptcc_certify.graphs.rationals import whole_number
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.model.base import Protocol, refuse_no_protocol
+from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.limited_gain import LimitedGain
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.simulation.instants import steps_towards
 from ptcc_certify.simulation.late_messages import stepped_run
@@ -47,6 +50,7 @@ def simulate_tracking(
     *,
     u: np.ndarray | None = None,
     steps: int = STEPS,
+    gain_cap: Fraction | None = None,
 ) -> Trajectory:
     """Run followers of leaders that move away from the follower that is farthest off, as fast as they may.
 
@@ -63,6 +67,8 @@ def simulate_tracking(
         By which distances are compared, positive; dimensionless.
     steps : int
         Up to ``T``, about.
+    gain_cap : Fraction, optional
+        The gain is at most this.
 
     Returns
     -------
@@ -95,13 +101,14 @@ def simulate_tracking(
     worst = WorstLeaders(structure, protocol, leaders, u)
     F, heads, L_F, Q = worst.followers, worst.heads, worst.L_F, worst.Q
     x = np.array([float(value) for value in as_state(x0, structure.graph, "x0")])
-    t, clock, last = _grid(protocol, steps)
+    limits = GainLimits(gain_cap=gain_cap)
+    limited = limits.limit(protocol.gain)
+    t, clock, last = _grid(limited, steps)
     step_of = _Step(worst, leaders)
     states, targets, inputs = np.zeros((3, t.size, structure.graph.n_nodes))
     lead, eps = x[heads], x[F] - Q @ x[heads]
     begin = time.perf_counter()
-    remaining = np.maximum(1 - t / float(protocol.T), 0)
-    gain = protocol.gain.value_at_remaining(remaining)
+    gain = limited.value(t, np.maximum(1 - t / float(protocol.T), 0))
     for i in range(t.size):
         states[i, heads] = targets[i, heads] = lead
         targets[i, F] = Q @ lead
@@ -111,22 +118,23 @@ def simulate_tracking(
             moved, eps = step_of(eps, clock[i], last[i])
             lead, inputs[i, heads] = lead + moved, moved / (t[i + 1] - t[i])
         inputs[i, F] += step_of.term
-    conditions, seconds = Conditions(leaders=leaders), time.perf_counter() - begin
+    conditions, seconds = Conditions(None if limits.ideal else limits, leaders=leaders), time.perf_counter() - begin
     run = stepped_run(structure.graph, protocol, t, states.T, inputs.T, conditions, NEAREST, seconds)
     return replace(run, targets=targets.T)
 
 
-def _grid(protocol: Protocol, steps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return instants, and of every step the clock that passes and the largest gain."""
-    T, gain = float(protocol.T), protocol.gain
+def _grid(limited: LimitedGain, steps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return instants, and of every step the clock that passes and the largest gain, infinite up to ``T`` uncapped."""
+    T = float(limited.gain.T)
     remaining = steps_towards(T, T / steps, SHARE, NEAREST) / T
     later = np.linspace(0, PAST * T, max(steps // 4, 2))[1:]
-    clock = gain.clock_at_remaining(np.maximum(remaining, NEAREST * 1e-3))
-    values = np.append(gain.value_at_remaining(remaining[1:-1]), np.inf)
-    rho1 = float(gain.rho1)
-    whole = np.concatenate([T * (1 - remaining), T + later])
-    passed = np.concatenate([np.diff(clock), rho1 * np.diff(later, prepend=0)])
-    return whole, passed, np.concatenate([values, np.full(later.size, rho1)])
+    t, seen = T * (1 - remaining), np.maximum(remaining, NEAREST * 1e-3)
+    values = limited.value(t[1:], seen[1:])
+    if not limited.bounded:
+        values[-1] = np.inf
+    low = float(limited.value(2 * T))
+    passed = np.concatenate([np.diff(limited.clock(t, seen)), low * np.diff(later, prepend=0)])
+    return np.concatenate([t, T + later]), passed, np.concatenate([values, np.full(later.size, low)])
 
 
 class _Step:

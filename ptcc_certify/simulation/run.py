@@ -14,6 +14,7 @@ import inspect
 import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
@@ -185,7 +186,7 @@ def simulate(
     only: dict[str, Any] = {"actuator": actuator, "noise": noise, "boundary_layer": layer}
     if beside:
         foreign = only | {"disturbance": disturbance, "times": how["times"]}
-        foreign |= {} if messages is not None else {"signal": signal}
+        foreign |= {} if messages is not None else {"signal": signal, "actuator": None}
         _refuse_beside(one, messages, leaders, sigma0, foreign)
         if messages is not None:
             heard: Any = signal if isinstance(signal, tuple) and len(signal) == 2 else (signal or "oldest", 0)
@@ -193,7 +194,7 @@ def simulate(
         assert leaders is not None
         from ptcc_certify.simulation.moving_leaders import simulate_tracking  # it loads SciPy
 
-        return simulate_tracking(one, protocol, leaders, x0)
+        return simulate_tracking(one, protocol, leaders, x0, gain_cap=_cap_alone(actuator))
     initial_state, tolerances = _floats(x0, one, "x0"), Tolerances.within(how["rtol"], how["atol"])
     manifold = None if sigma0 is None else _floats(sigma0, one, "sigma0")
     _refuse_foreign(protocol, family, only | {"sigma0": sigma0, "disturbance": disturbance})
@@ -405,6 +406,13 @@ def _refuse_foreign(protocol: Protocol, family: Family | None, given: Mapping[st
     for name in (*of_nominal, "boundary_layer") if family is not None else ():
         if given[name] is not None:
             raise ParameterError(f"{name} is not simulated of families yet; leave it out")
+
+
+def _cap_alone(actuator: GainLimits | None) -> Fraction | None:
+    """Return the cap of limits that are no more than that."""
+    if actuator is None or (actuator.stop_before is None and actuator.sample_period is None):
+        return None if actuator is None else actuator.gain_cap
+    raise ParameterError("actuator: leaders that move are simulated under a cap of the gain alone; leave the rest out")
 
 
 def _refuse_beside(

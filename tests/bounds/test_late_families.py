@@ -66,11 +66,10 @@ def worst_ratio(certificate: Certificate, rng: np.random.Generator) -> tuple[flo
     Mode, weights, ages, errors, leaders and disturbances are held over a step, ages so that they stay within the
     delay: what agents hear is constant then, and the motion exact but for disturbances, which are taken too small.
     """
-    family, late, tracking = certificate.family, certificate.late, certificate.tracking
-    messages = None if late is None else late.messages
+    family, late = certificate.family, certificate.late
+    messages = None if late.tracks else late.messages
     ages = ages_of(family, messages)
     leaders = certificate.asked_leaders
-    gain = certificate.protocol.gain if late is None else late.gain
     T, delay = float(certificate.protocol.T), 0.0 if messages is None else float(messages.age)
     error = 0.0 if messages is None else float(messages.value_error)
     speed, pushed = (0.0, 0.0) if leaders is None else (float(leaders.speed), float(leaders.disturbance))
@@ -85,15 +84,12 @@ def worst_ratio(certificate: Certificate, rng: np.random.Generator) -> tuple[flo
     ]
     capped = messages is not None and messages.gain_cap is not None
     late_grid = np.linspace(0, T, 121) if capped else T * (1 - np.geomspace(1, 1e-3, 121))
-    clock = late.gain.clock(late_grid) if late is not None else gain.clock_at_remaining(1 - late_grid / T)
-    if late is not None and messages is not None and not capped:
+    clock = late.gain.clock(late_grid)
+    if not capped:
         clock = certificate.protocol.gain.clock_at_remaining(1 - late_grid / T)
     x = np.array([float(y) for y in certificate.initial_state or ()])
     history, seen, largest = [(0.0, x.copy())], 0.0, 0.0
-    bounds = late.deviation_bound(late_grid) if late is not None else None
-    if tracking is not None:
-        bounds = tracking.distance_bound(1 - late_grid / T)
-    inputs = (late or tracking).input  # type: ignore[union-attr]
+    bounds, inputs = late.deviation_bound(late_grid), late.input
     for j, (t, after) in enumerate(pairwise(late_grid.tolist())):
         off = x[followers] - R @ x
         side = np.where(off == 0, rng.choice([-1.0, 1.0], off.size), np.sign(off))
@@ -254,9 +250,6 @@ def test_what_is_certified_is_read_back(name: str, x0: tuple[int, ...] | None, t
         assert found.late.largest == pytest.approx(made.late.largest) and found.late.relative == (x0 is None)
         t = np.linspace(0, 1, 11)
         assert found.late.deviation_bound(t) == pytest.approx(made.late.deviation_bound(t))
-    if made.tracking is not None:
-        q = np.linspace(0, 1, 11)
-        assert found.tracking.distance_bound(q) == pytest.approx(made.tracking.distance_bound(q))
 
 
 def test_a_delay_that_is_not_forgiven_is_left_open_and_read_back(tmp_path: Path):
@@ -340,10 +333,10 @@ def forged(name: str, path: str, value: Any) -> str | None:
         ("capped", "messages.value_error", "1"),
         ("late behind leaders that move", "messages.rows.0.drift", "0"),
         ("late behind leaders that move", "messages.rows.0.after", "0"),
-        ("leaders that move", "leaders.initial", "0"),
-        ("leaders that move", "leaders.after", "0"),
-        ("leaders that move", "leaders.speed", "9"),
-        ("leaders that move, followed with a sign term", "leaders.sign_gain", "1/4"),
+        ("leaders that move", "messages.rows.0.initial", "0"),
+        ("leaders that move", "messages.rows.0.after", "0"),
+        ("leaders that move", "messages.leaders.speed", "9"),
+        ("leaders that move, followed with a sign term", "messages.leaders.sign_gain", "1/4"),
     ],
 )
 def test_a_forged_number_is_rejected(name: str, path: str, value: str):
@@ -356,12 +349,12 @@ def test_rows_hold_at_the_worst_weights_of_every_mode_alone():
     night = Family.from_intervals([("l", "a", "0.1", 2), ("a", "b", 1, 6)])
     both = certify(Family.switching([day, night]), PROTOCOL, [0, 1, 1], leaders=MovingLeaders(speed=1))
     data = both.to_dict()
-    (step,) = (one for one in data["proof"] if one["kind"] == "tracking")
-    assert float(Fraction(step["numbers"]["a"])) <= 0.1
-    step["numbers"]["a"] = "1/9"
+    step = next(one for one in data["proof"] if one["kind"] == "late-rows")
+    assert float(Fraction(step["numbers"]["b"])) <= 0.1
+    step["numbers"]["b"] = "1/9"
     data["digest"] = digest(data)
     assert "does not decay so fast" in str(check(data).reason)
-    assert json.loads(both.to_json())["leaders"]["speed"] == "1"
+    assert json.loads(both.to_json())["messages"]["leaders"]["speed"] == "1"
 
 
 def test_figures_are_of_what_is_asked(tmp_path: Path):
@@ -385,7 +378,7 @@ def test_page_and_latex_tell_no_end_of_another_problem(name: str, tmp_path: Path
     made.save(tmp_path / "c.json")
     saved = ptcc.read_certificate(tmp_path / "c.json")
     capped = made.late is not None and made.late.messages.gain_cap is not None
-    absent = {"without a gain cap": capped, "nothing late": made.late is not None, "leaders at rest": made.leaders_move}
+    absent = {"without a gain cap": capped, "nothing late": not made.late.tracks, "leaders at rest": made.leaders_move}
     asked = made.proof.asked_leaders
     absent["without disturbances"] = asked is not None and asked.disturbance > 0
     without = ", ".join(text for text, there in absent.items() if there)

@@ -22,12 +22,12 @@ from selection import thinned
 from lmi.errors import NoCertificate
 from ptcc_certify.bounds.delay import decay_by_rows
 from ptcc_certify.bounds.delay.case import LateCase
+from ptcc_certify.bounds.delay.decay_by_rows import drift_integral
 from ptcc_certify.bounds.delay.late_messages import LateBounds, bound_late
 from ptcc_certify.bounds.delay.longest_delay import bound_at, bound_case, longest_delay
 from ptcc_certify.bounds.delay.small_delays import delay_threshold
 from ptcc_certify.bounds.delay.staged_deadlines import levels
 from ptcc_certify.bounds.final_state.of_graph import final_state
-from ptcc_certify.bounds.tracking import bound_tracking, drift_integral
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker.drift_by_leaders import drift_above
@@ -39,7 +39,7 @@ from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.lyapunov.late_follower_rows import FollowerRows
 from ptcc_certify.model import NominalProtocol
 from ptcc_certify.model.asks import Asks, Expectations
-from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.late_messages import AtOnce, LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.simulation.late_messages import PATTERNS, simulate_late
 from ptcc_certify.simulation.moving_leaders import simulate_tracking
@@ -390,24 +390,37 @@ def test_a_delay_of_an_edge_that_is_not_there_is_named() -> None:
 # ---------------------------------------------------------------------- leaders that move
 
 
+def tracked(
+    structure: Structure,
+    protocol: NominalProtocol,
+    leaders: MovingLeaders,
+    x0: Any = None,
+    ends: Any = None,
+    **cap: Any,
+) -> LateBounds:
+    """What is proved of followers that hear at once of leaders that move."""
+    return bound_late(LateCase(structure, protocol, AtOnce(**cap), x0, ends, leaders))
+
+
 def _judge_tracking(seed: int) -> tuple[float, float]:
     """Return the worst ratio before T without the sign term, and after T to its bound."""
     rng, structure, protocol, x0, ends = _case(seed)
     speed, delta = Fraction(int(rng.integers(0, 30)), 10), Fraction(int(rng.integers(1, 20)), 10)
     leaders = MovingLeaders(speed=speed, disturbance=delta)
-    tracking = bound_tracking(structure, protocol, leaders, x0, ends.intervals)
-    run = simulate_tracking(structure.graph, protocol, leaders, [float(x) for x in x0], u=tracking.witness.u, steps=300)
+    cap = None if seed % 3 else Fraction(int(rng.integers(20, 200)), 10)
+    late = tracked(structure, protocol, leaders, x0, ends.intervals, gain_cap=cap)
+    u, first = late.rows[0].witness.u, [float(x) for x in x0]
+    run = simulate_tracking(structure.graph, protocol, leaders, first, u=u, steps=300, gain_cap=cap)
     F, T = structure.followers, float(protocol.T)
-    away = np.abs(run.states - run.targets)[F]
-    before, after = run.t < T * (1 - 1e-8), run.t > T * (1 + 1e-8)
-    bound = tracking.distance_bound(1 - run.t[before] / T)
     scale = max(1.0, float(max(map(abs, x0))))
-    ratio = float(((away[:, before] - 1e-12 * scale) / bound).max())
-    later = float((away[:, after] / tracking.witness.u[:, None]).max() / float(tracking.after))
-    if tracking.input is not None:
+    away = np.abs(run.states - run.targets)[F] - 1e-12 * scale
+    before, after = run.t < T * (1 - 1e-8), run.t > T * (1 + 1e-8)
+    bound = late.deviation_bound(run.t)
+    assert (bound[:, after] <= late.after * (1 + 1e-9)).all() or cap is not None
+    if late.input is not None:
         e = np.abs(structure.graph.dense_laplacian() @ run.states)[F][:, before]
-        assert (protocol.gain.value(run.t[before]) * e <= tracking.input[F][:, None] * (1 + 1e-6)).all()
-    return ratio, later
+        assert (late.gain.value(run.t[before]) * e <= late.input[F][:, None] * (1 + 1e-6)).all()
+    return tuple(float((away[:, when] / bound[:, when]).max()) for when in (before, after))  # type: ignore[return-value]
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -428,12 +441,12 @@ def _judge_sign(seed: int) -> float:
     """Return the worst ratio with the sign term, which is solved for at the end of every step."""
     _, structure, protocol, x0, ends = _case(seed)
     leaders = MovingLeaders(speed=1, disturbance="1/2", sign_gain="3/2")
-    tracking = bound_tracking(structure, protocol, leaders, x0, ends.intervals)
-    run = simulate_tracking(structure.graph, protocol, leaders, [float(x) for x in x0], u=tracking.witness.u, steps=400)
-    F, T = structure.followers, float(protocol.T)
-    away = np.abs(run.states - run.targets)[F] / tracking.witness.u[:, None]
-    at = 1 - run.t / T
-    bound = tracking.distance_bound(np.maximum(at, 0)) / tracking.witness.u[:, None]
+    cap = None if seed % 3 else Fraction(20)
+    late = tracked(structure, protocol, leaders, x0, ends.intervals, gain_cap=cap)
+    u, first = late.rows[0].witness.u, [float(x) for x in x0]
+    run = simulate_tracking(structure.graph, protocol, leaders, first, u=u, steps=400, gain_cap=cap)
+    away = np.abs(run.states - run.targets)[structure.followers] / u[:, None]
+    bound = late.deviation_bound(run.t) / u[:, None]
     return float((away / np.maximum(bound, 1e-9)).max())
 
 
@@ -454,7 +467,7 @@ def test_a_sign_gain_below_what_pushes_is_refused_and_leaders_in_a_group_too() -
     group = analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1), (2, 3, 1)]))
     protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
     with pytest.raises(HypothesisError, match="1 and 2 are leaders of one group"):
-        bound_tracking(group, protocol, MovingLeaders(speed=1))
+        certify(group.graph, protocol, leaders=MovingLeaders(speed=1))
 
 
 def test_runs_refuse_what_they_cannot_run_by_name() -> None:
@@ -491,7 +504,7 @@ def test_certificates_show_and_draw_late_messages_and_moving_leaders() -> None:
     for name, asked in (("late", {"messages": LateMessages(delay="0.1")}), ("tracking", {"leaders": MovingLeaders(1)})):
         cert = certify_words(chain, p, [1, 0, 2], method="perron", simulation=False, **asked)
         assert cert.plot(name).lines
-        assert len(repr(getattr(cert, name))) < 120
+        assert len(repr(cert.late)) < 120
         assert "<svg" in cert._repr_html_() or "<img" in cert._repr_html_()
     assert certify(chain, p, messages=LateMessages(delay="0.1"), asks=Asks(method="perron")).late.relative
 
@@ -684,9 +697,8 @@ def test_without_speed_and_disturbance_nothing_changes(seed: int) -> None:
 def test_with_ever_shorter_delays_the_bound_comes_to_that_of_tracking(seed: int) -> None:
     """At ``T`` nothing is left in the limit, and before it no more than by rows at once."""
     structure, protocol, _, leaders, x0, ends = _both(4100 + seed)
-    tracking = bound_tracking(structure, protocol, leaders, x0, ends.intervals)
     t = np.array([0.3, 0.7, 0.9, 0.99]) * float(protocol.T)
-    allowed = tracking.distance_bound(1 - t / float(protocol.T)).max(axis=0)
+    allowed = tracked(structure, protocol, leaders, x0, ends.intervals).largest_bound(t)
     left, before = [], []
     for age in ("1e-3", "1e-5", "1e-7"):
         late = bound_late(
@@ -743,7 +755,7 @@ def test_late_messages_and_leaders_that_move_are_saved_and_read() -> None:
         with TemporaryDirectory() as folder:
             made.save(Path(folder) / "c.json")
             saved = read_certificate(Path(folder) / "c.json")
-        assert saved.late is not None and made.late is not None and saved.tracking is None
+        assert saved.late is not None and made.late is not None
         assert saved.late.leaders == leaders and saved.late.messages == messages
         np.testing.assert_array_equal(saved.late.residual, made.late.residual)
         assert saved.late.after == made.late.after and saved.late.never_below == made.late.never_below
@@ -855,10 +867,6 @@ def test_instants_before_0_or_none_are_refused(t: Any) -> None:
     for ask in (bounds.deviation_bound, bounds.largest_bound):
         with pytest.raises(ParameterError, match=r"^t "):
             ask(t)
-    tracking = bound_tracking(structure, NominalProtocol(), MovingLeaders(1))
-    assert tracking.distance_bound(0.5).shape == (1, 1)
-    with pytest.raises(ParameterError, match=r"^remaining"):
-        tracking.distance_bound(-0.5)
 
 
 def test_what_inexact_values_add_is_proved_where_weights_cancel() -> None:

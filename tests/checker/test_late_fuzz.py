@@ -45,7 +45,7 @@ SINGLY = (
     "settling of 2",
 )
 #: Obligations and parts of section 22.
-OWN = ("messages", "leaders", "late-", "tracking")
+OWN = ("messages", "late-")
 
 
 @cache
@@ -90,7 +90,7 @@ def owned(data: Json) -> Callable[[tuple[str | int, ...]], bool]:
     """Whether a path leads to what section 22 describes, or to an obligation of it."""
     begin = sum(not step["kind"].startswith(OWN) for step in data["proof"])
     own = {("proof", k) for k in range(begin, len(data["proof"]))}
-    return lambda path: path[:1] in (("messages",), ("leaders",)) or path[:2] in own
+    return lambda path: path[:1] == ("messages",) or path[:2] in own
 
 
 def own_part(rng: Rng, data: Json, files: dict[str, bytes]) -> Json:
@@ -201,5 +201,5 @@ def test_motions_keep_to_what_is_accepted_on_many_graphs(part: int):
             assert report.accepted, (seed, report.rejected, report.reason)
             assert late_claims(made) == [], seed
             kinds.update(step["kind"] for step in made["proof"][-6:])
-    assert min(kinds[kind] for kind in ("late-rows", "late-steps", "tracking")) >= 20
+    assert min(kinds[kind] for kind in ("late-rows", "late-steps")) >= 20
     assert kinds["late-missed"] and kinds["late-staged"]

@@ -173,11 +173,11 @@ def test_motions_keep_to_what_is_accepted(name: str):
         ("settling", ("messages", "settling", "left"), F(9, 10), "settling: left"),
         ("settling", ("messages", "settling", "cap"), F(11, 10), "settling: b cap delay"),
         ("settling, capped", ("messages", "settling", "clock"), F(11, 10), "settling: clock"),
-        ("leaders", ("leaders", "after"), F(9, 10), "after"),
+        ("leaders", ("messages", "rows", 0, "after"), F(9, 10), "after"),
         ("moving", ("messages", "rows", 0, "floor"), F(9, 10), "floor"),
         ("moving", ("messages", "rows", 0, "after"), F(9, 10), "after"),
         ("moving", ("messages", "rows", 0, "drift"), F(1, 2), "drift"),
-        ("leaders", ("leaders", "initial"), F(9, 10), "initial"),
+        ("leaders", ("messages", "rows", 0, "initial"), F(9, 10), "initial"),
     ],
 )
 def test_the_oracle_finds_what_is_false(name: str, path: tuple[Any, ...], factor: Fraction, claim: str):
@@ -200,8 +200,8 @@ def test_motions_alone_find_bounds_that_are_far_too_small():
     residual = {label: str(F(x) / 200) for label, x in data["messages"]["residual"].items()}
     assert "residual" in late_claims(changed(data, ("messages", "residual"), residual))
     data = samples()["leaders"]
-    inputs = {label: str(F(x) / 50) for label, x in data["leaders"]["input"].items()}
-    assert any("input at" in told for told in late_claims(changed(data, ("leaders", "input"), inputs)))
+    inputs = {label: str(F(x) / 50) for label, x in data["messages"]["input"].items()}
+    assert any("input at" in told for told in late_claims(changed(data, ("messages", "input"), inputs)))
 
 
 # ---------------------------------------------------------------------- rows
@@ -270,7 +270,7 @@ def test_values_that_are_off_leave_a_floor():
     assert "cap is null iff" in reason(data, (*row, "cap"), "1")
     assert "heard wrong" in reason(data, (*TOP, "value_error"), "11/100")
     assert "value_error is negative" in reason(data, (*TOP, "value_error"), "-1/10")
-    assert "nothing is late, and nothing is off" in reason(data, (*TOP, "value_error"), "0")
+    assert "nothing is late or off, and leaders rest" in reason(data, (*TOP, "value_error"), "0")
 
 
 # ---------------------------------------------------------------------- what is late
@@ -349,9 +349,8 @@ def test_leaders_in_groups_do_not_rest():
         obligation("late-residual", "messages.residual"),
     ]
     assert "group of two or more" in reason({**data, "messages": said, "proof": proof})
-    leaders = {**led()["leaders"], "input": None}
-    proof = [*data["proof"], obligation("tracking", "leaders", {"a": "1/100"}, u)]
-    assert "group of two or more" in reason({**data, "leaders": leaders, "proof": proof})
+    said = {**led()["messages"], "input": None, "residual": dict.fromkeys("abcd", "9")}
+    assert "group of two or more" in reason({**data, "messages": said, "proof": proof})
 
 
 def test_without_followers_nothing_is_late():
@@ -359,7 +358,6 @@ def test_without_followers_nothing_is_late():
     said = {**with_messages(base())["messages"], "residual": {"a": "0", "b": "0"}}
     assert "no follower" in reason({**data, "messages": said})
     assert "latencies without edges" in reason({**data, "messages": {**said, "latency": []}})
-    assert "no follower" in reason({**data, "leaders": {**led()["leaders"], "input": None}})
 
 
 def test_parts_that_stand_alone_or_are_missing_are_refused():
@@ -371,14 +369,13 @@ def test_parts_that_stand_alone_or_are_missing_are_refused():
     assert '"more" is not known' in reason(data, TOP, {**data["messages"], "more": None})
     assert '"own" is missing' in reason(data, TOP, {k: v for k, v in data["messages"].items() if k != "own"})
     assert "messages is null" in reason(data, TOP, None)
-    assert "leaders that move" in reason({**data, "leaders": led()["leaders"]})
+    assert '"leaders" is not known' in reason({**data, "leaders": None})
     assert "rows is not a list" in reason(data, (*TOP, "rows"), None)
     moving = base(sigma=F(1, 10))
     assert "while sliding variables move" in reason({**moving, "messages": samples()["sliding"]["messages"]})
     family = Family.from_intervals([("a", "b", 1, 2)])
     whole = certify(family, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2]).to_dict()
-    for key in ("messages", "leaders"):
-        assert "is missing" in reason({**whole, "unverified": {}, key: {}})
+    assert "is missing" in reason({**whole, "unverified": {}, "messages": {}})
     whole = certify(
         family, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2], messages=LateMessages("0.01")
     ).to_dict()
@@ -718,7 +715,7 @@ def test_no_input_is_taken_without_a_cap_or_without_what_bounds_it():
     free = with_messages(base(1, "mixed", True), "1/50")
     stated = dict.fromkeys(free["graph"]["nodes"], "1000000")
     forged = changed(free, (*TOP, "input"), stated)
-    assert "input without a cap" in reason(
+    assert "is not proved" in reason(
         {**forged, "proof": [*forged["proof"], obligation("late-input", "messages.input")]}
     )
     bare = with_messages(base(1, "mixed", True), "1/50", gain_cap=20, qs=(), steps=40)
@@ -731,43 +728,43 @@ def test_no_input_is_taken_without_a_cap_or_without_what_bounds_it():
 
 
 def test_leaders_that_are_faster_than_what_follows_are_refused():
-    data, top, told = led(), ("leaders",), step(led(), "leaders")
-    a = F(data["proof"][told[1]]["numbers"]["a"])
-    assert "does not decay so fast" in reason(data, (*told, "numbers", "a"), str(a * F(1001, 1000)))
-    assert "b is not positive" in reason(data, (*told, "numbers", "a"), "0")
+    data, top, row, told = led(), (*TOP, "leaders"), (*TOP, "rows", 0), step(led(), "messages.rows[0]")
+    b = F(data["proof"][told[1]]["numbers"]["b"])
+    assert "does not decay so fast" in reason(data, (*told, "numbers", "b"), str(b * F(1001, 1000)))
+    assert "b is not positive" in reason(data, (*told, "numbers", "b"), "0")
     assert "is negative" in reason(data, (*top, "speed"), "-1/2")
     assert "is negative" in reason(data, (*top, "disturbance"), "-1/2")
-    assert "after is not proved" in reason(data, (*top, "speed"), "51/100")
-    assert "after is not proved" in reason(data, (*top, "disturbance"), "1/100")
-    assert "after is not proved" in reason(data, (*top, "after"), str(F(data["leaders"]["after"]) * F(999, 1000)))
-    assert "starts farther" in reason(data, (*top, "initial"), str(F(data["leaders"]["initial"]) * F(999, 1000)))
-    for label, x in data["leaders"]["input"].items():
-        less = str(F(x) * F(999, 1000) if F(x) else 1)
-        assert ("of a leader" if not F(x) else "is not proved") in reason(data, (*top, "input", label), less)
+    assert "is pushed farther" in reason(data, (*top, "speed"), "51/100")
+    assert "is pushed farther" in reason(data, (*top, "disturbance"), "1/100")
+    for key, why in (("after", "is pushed farther"), ("initial", "starts farther")):
+        assert why in reason(data, (*row, key), str(F(at(data, row)[key]) * F(999, 1000)))
+    for label, x in data["messages"]["input"].items():
+        if F(x):
+            assert "is not proved" in reason(data, (*TOP, "input", label), str(F(x) * F(999, 1000)))
     u = data["proof"][told[1]]["witness"]["u"]
     assert "u is not positive" in reason(data, (*told, "witness", "u"), [f"-{u[0]}", *u[1:]])
     assert "u has not" in reason(data, (*told, "witness", "u"), u[1:])
-    assert "leaders is null" in reason(data, top, None)
+    assert "and leaders rest" in reason(data, top, None)
 
 
 def test_a_sign_term_below_the_speeds_is_refused():
     data = led("1/2")
-    assert "sign_gain is below" in reason(data, ("leaders", "sign_gain"), "49/100")
-    assert "sign_gain is below" in reason(data, ("leaders", "sign_gain"), "-1/2")
-    assert "sign_gain is below" in reason(data, ("leaders", "speed"), "51/100")
-    assert "after is not 0" in reason(data, ("leaders", "after"), "1/10")
-    plain_of = led()
-    forged = changed(plain_of, ("leaders", "after"), "0")
-    assert "after is not proved" in reason(forged)
+    assert "sign_gain is below" in reason(data, (*TOP, "leaders", "sign_gain"), "49/100")
+    assert "sign_gain is below" in reason(data, (*TOP, "leaders", "sign_gain"), "-1/2")
+    assert "sign_gain is below" in reason(data, (*TOP, "leaders", "speed"), "51/100")
+    assert "is pushed farther" in reason(changed(led(), (*TOP, "rows", 0, "after"), "0"))
+    stepped = with_messages(base(), qs=("21/20",), steps=30, moving=("1/2", "0"))
+    moving = stepped["messages"]["leaders"]
+    assert "steps beside a sign term" in reason(stepped, (*TOP, "leaders"), {**moving, "sign_gain": "1/2"})
 
 
 def test_an_input_that_may_grow_is_refused():
     slow = plain(SignedDigraph.from_edges([("a", "b", "1/10")]), nominal(k=3), [1, 2])
     data = with_leaders(slow)
-    assert data["leaders"]["input"] is None and check(data).accepted
-    assert "too small for a bounded input" in reason(data, ("leaders", "input"), {"a": "0", "b": "999999"})
-    sliding = base(sigma=0)
-    assert "under the sliding-mode protocol" in reason({**sliding, "leaders": data["leaders"]})
+    assert data["messages"]["input"] is None and check(data).accepted
+    forged = changed(data, (*TOP, "input"), {"a": "0", "b": "999999"})
+    forged = {**forged, "proof": [*forged["proof"], obligation("late-input", "messages.input")]}
+    assert "the input of agent b is not proved" in reason(forged)
 
 
 # ---------------------------------------------------------------------- late messages behind leaders that move
@@ -801,13 +798,13 @@ def test_leaders_that_move_are_refused_beside_what_is_of_leaders_at_rest():
     still = with_messages(base(), qs=("21/20", "11/10"), steps=30)
     assert "told iff leaders move" in reason(data, top, None)
     assert "told iff leaders move" in reason(still, top, {"speed": "1/2", "disturbance": "1/5"})
-    assert '"sign_gain" is not known' in reason(data, top, {**data["messages"]["leaders"], "sign_gain": None})
+    assert "sign_gain is null" in reason(data, top, {**data["messages"]["leaders"], "sign_gain": None})
     assert '"speed" is missing' in reason(data, top, {"disturbance": "0"})
     assert "leaders is not an object" in reason(data, top, [])
     assert '"leaders" is missing' in reason(
         data, TOP, {key: value for key, value in data["messages"].items() if key != "leaders"}
     )
-    assert "stand under messages" in reason({**data, "leaders": led()["leaders"]})
+    assert '"leaders" is not known' in reason({**data, "leaders": data["messages"]["leaders"]})
     moving = data["messages"]["leaders"]
     for key, whole in (("missed", full()), ("staged", full()), ("form", form(False)), ("settling", settling(1))):
         assert whole["messages"][key] and "though leaders move" in reason(whole, top, moving)
@@ -842,7 +839,7 @@ def test_many_leaders_that_are_told_of_in_long_numbers_take_no_long_time():
 def beside(data: Json) -> tuple[Json, Side]:
     """The same with every vector of section 22 in a side file that may stand in one."""
     data, side = copy.deepcopy(data), Side()
-    said = data.get("messages") or data["leaders"]
+    said = data["messages"]
     for key in ("residual", "input"):
         if said.get(key):
             said[key] = side.numbers([F(math.ceil(F(x) * 10**9), 10**9) for x in said[key].values()])
@@ -850,7 +847,7 @@ def beside(data: Json) -> tuple[Json, Side]:
         said["latency"] = side.numbers([F(x) for x in said["latency"]])
     for told in data["proof"]:
         for key in ("u", "start"):
-            if told["kind"] in ("late-rows", "late-steps", "tracking") and key in told["witness"]:
+            if told["kind"] in ("late-rows", "late-steps") and key in told["witness"]:
                 told["witness"][key] = side.numbers([F(x) for x in told["witness"][key]])
         if told["kind"] == "late-missed":
             told["witness"]["gauge"] = side.integers(told["witness"]["gauge"])

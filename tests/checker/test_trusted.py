@@ -237,7 +237,6 @@ def of_messages() -> list[str]:
         "late-lmi",
         "late-input",
         "late-settling",
-        "tracking",
     } <= kinds
     return [one.to_json() for one in made]
 

@@ -192,9 +192,8 @@ def test_followers_track_leaders_that_move_and_the_file_says_so() -> None:
     assert run.code == 0, run
     assert re.search(r"on its target at T = 1, within \S+ of it from then on", " ".join(run.out.split()))
     assert ptcc("check", "l.json").code == 0
-    tracking = read_certificate("l.json").tracking
-    assert tracking is not None
-    assert tracking.distance_bound(np.array([0.0])).max() == 0
+    late = read_certificate("l.json").late
+    assert late is not None and late.tracks and late.largest_bound([1.0]).max() == 0
     sign = ptcc("certify", "team.csv", "--leader-speed", "1", "--sign-gain", "1", *START, *QUICK)
     assert "ever after" in sign.out
 
@@ -260,9 +259,11 @@ def test_agents_that_begin_on_their_targets_are_not_said_to_get_little_nearer(wo
         (("team.csv", "--delay", "0.1", "--sample-period", "0.1"), "--sample-period: of late messages a period tells"),
         (("team.csv", "--delay", "0.1", "--gain-cap", "9", "--noise", "1"), "a quantisation of 4 NU"),
         (("team.csv", "--delay", "0.1", "--delta", "1"), "delta is not proved of late messages under the nominal"),
-        (("team.csv", "--leader-speed", "1", "--gain-cap", "9"), "--gain-cap: leaders that move are tracked at T by a"),
-        (("team.csv", "--leader-speed", "1", "--stop-before", "0.1"), "--stop-before: leaders that move are tracked"),
-        (("team.csv", "--leader-speed", "1", "--noise", "1"), "noise is not proved while leaders move"),
+        (
+            ("team.csv", "--leader-speed", "1", "--stop-before", "0.1"),
+            "certified under one gain cap alone; leave it out",
+        ),
+        (("team.csv", "--leader-speed", "1", "--noise", "1"), "noise: while leaders move an error of values tells it"),
         (("team.csv", "--uncertainty", "1%", "--delay", "none"), 'no column "none"; add it, or name one of source'),
         (("team.csv", "--uncertainty", "1%", "--delta", "1"), "--delta is for one graph, not for families yet"),
         (("team.csv", "--uncertainty", "1%", "--gain-cap", "9"), "--gain-cap is for one graph, not for families yet"),
@@ -282,10 +283,6 @@ def test_agents_that_begin_on_their_targets_are_not_said_to_get_little_nearer(wo
         (("team.csv", "--sign-gain", "1"), "--sign-gain belongs to leaders that move; give --leader-speed"),
         (("team.csv", "--leader-speed", "1", "--sign-gain", "0.5"), "is below speed + disturbance = 1"),
         (("team.csv", "--leader-speed=-1"), "speed = -1 is outside its domain"),
-        (
-            ("team.csv", "--leader-speed", "1", "--delay", "1", "--sign-gain", "2"),
-            "--sign-gain: nothing is proved of a sign term where messages are late; leave it out",
-        ),
         (
             ("team.csv", "--leader-speed", "1", "--delay", "1", "--own-delay", "--gain-cap", "9"),
             "--own-delay: an own state that is late is certified of leaders at rest alone; leave one of the two out",
@@ -545,9 +542,9 @@ def test_simulate_draws_such_runs_and_takes_them_from_a_scenario(words: tuple[st
         (("--delay", "0.1", "--stop-before", "0.1"), "--stop-before: is not simulated with late messages"),
         (("--delay", "0.1", "--steps", "9"), "--steps: is not simulated with late messages"),
         (("--delay", "0.1", "--samples", "9"), "--samples: is not simulated with late messages"),
-        (("--delay", "0.1", "--leader-speed", "1", "--sign-gain", "2"), "--sign-gain: nothing is proved of a sign"),
+        (("--delay", "0.1", "--leader-speed", "1", "--sign-gain", "2"), "--sign-gain is not simulated where messages"),
         (("--delay", "0.1", "--delta", "1"), "--delta: is not simulated with late messages"),
-        (("--leader-speed", "1", "--gain-cap", "9"), "--gain-cap: is not simulated with leaders that move"),
+        (("--leader-speed", "1", "--stop-before", "0.1"), "--stop-before: is not simulated with leaders that move"),
         (("--delay", "0.1", "--agents", "double-integrator"), "--delay: is not simulated of agents of order n"),
         (("--delay", "0.1", "--uncertainty", "10%"), "--delay: is not simulated of families of graphs"),
         (("--delay", "1e-9"), "more than 20,000 steps"),
@@ -588,7 +585,7 @@ def test_what_is_not_simulated_beside_is_refused_in_python() -> None:
     for more, said in (({"actuator": GainLimits(gain_cap=9)}, "gain_cap="), ({"times": [1]}, "times: is not")):
         with pytest.raises(ParameterError, match=said):
             simulate(graph, p, [1, 0], messages=late, **more)
-    with pytest.raises(ParameterError, match="sign_gain: nothing is proved"):
+    with pytest.raises(ParameterError, match="sign_gain is not simulated where messages are late"):
         simulate(graph, p, [1, 0], messages=late, leaders=MovingLeaders(speed=1, sign_gain=1))
     with pytest.raises(ParameterError, match="own_delay: an own state that is late"):
         own = LateMessages(delay="0.1", own_delay=True, gain_cap=3)
@@ -704,9 +701,9 @@ def test_a_file_without_anything_proved_of_moving_leaders_still_says_that_they_w
     made = certify(
         graph, NominalProtocol(T=1, rho1=1, rho2=4, kappa=1), [1, 2, 3], leaders=leaders, asks=Asks(method="paper")
     )
-    made.changed(tracking=None).save("c.json")
+    made.changed(late=replace(made.late, rows=(), residual=None, input=None)).save("c.json")
     saved = read_certificate("c.json")
-    assert saved.request.leaders == leaders and saved.tracking is None
+    assert saved.request.leaders == leaders and not saved.late.says_something
     assert "left open: leaders that move" in saved.assessment.text and int(saved.assessment.exit_code) == 4
 
 

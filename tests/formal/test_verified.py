@@ -137,7 +137,7 @@ def test_what_cannot_be_read_or_told_takes_one_line_and_bounded_memory(tmp_path:
 def test_claims_besides_those_of_the_graph_are_named_and_not_believed(tmp_path: Path) -> None:
     program()
     document = json.loads(paper_examples()[0])
-    for key, kind in (("messages", "late-rows"), ("leaders", "tracking")):
+    for key, kind in (("messages", "late-rows"), ("messages", "late-steps")):
         false = {"kind": kind, "of": key, "proves": "", "lemma": "", "numbers": {}, "witness": None}
         more = {**document, key: {"delay": "0"}, "proof": [*document["proof"], false]}
         code, text = said(resealed(more), tmp_path)

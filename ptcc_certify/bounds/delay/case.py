@@ -1,10 +1,10 @@
-"""What is asked of late messages: a graph or a family, a protocol, messages, and what is known already."""
+"""What is asked of late messages and moving leaders: of whom, under which protocol, and what is known already."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from fractions import Fraction
 from functools import cached_property
 
@@ -12,7 +12,6 @@ import numpy as np
 
 from lmi.exact.elementary_enclosures import rounded
 from ptcc_certify.bounds.final_state.of_graph import Influence
-from ptcc_certify.bounds.tracking import asked_leaders
 from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above
 from ptcc_certify.checker.late_input import gain_above
 from ptcc_certify.checker.lyapunov_form import Form
@@ -65,7 +64,7 @@ class DecayingForm:
 
 @dataclass(frozen=True, eq=False)
 class LateCase:
-    """A graph or a family whose messages are late.
+    """A graph or a family whose messages are late, or whose leaders move.
 
     Parameters
     ----------
@@ -78,7 +77,7 @@ class LateCase:
     ends : sequence of N (middle, radius), optional
         Of ``Q X(0)``; without it bounds are for every initial state within 1 of its final one.
     leaders : MovingLeaders, optional
-        Without a sign term: leaders move, and followers are disturbed; ``x*`` moves with the leaders.
+        Leaders move, and followers are disturbed; ``x*`` moves with the leaders. A sign term asks for messages at once.
     influence : Influence, optional
         Exact; it belongs to ``forms``.
     forms : sequence of DecayingForm
@@ -162,12 +161,22 @@ class LateCase:
         part = {x: math.ceil(PARTS * (x + self.messages.held) / age) for x in set(latencies)}
         return None if min(part.values()) == PARTS else np.array([part[x] / PARTS for x in latencies])
 
+    @property
+    def signed(self) -> bool:
+        """Whether followers have a sign term."""
+        return self.leaders is not None and self.leaders.sign_gain is not None
+
+    @property
+    def push(self) -> Fraction:
+        """How fast a follower and its target may part: 0 with a sign term, which takes that up."""
+        return Fraction(0) if self.leaders is None or self.signed else self.leaders.total
+
     # ------------------------------------------------------------------ the gain that acts
 
     @cached_property
     def exact(self) -> Messages:
         """What the formulas of the check know of the messages, latencies left out."""
-        told, moving = self.messages, asked_leaders(self.leaders, Moving)
+        told, moving = self.messages, asked_leaders(self.leaders)
         late, latency = told.own_delay, Numbers([Fraction(0)])
         return Messages(self.protocol.gain.exact, latency, told.age, late, told.value_error, told.gain_cap, moving)
 
@@ -193,3 +202,13 @@ class LateCase:
         """Bound ``sup_t g e^(-b s)`` from above, ``g`` the gain that acts, which has a cap."""
         assert self.messages.gain_cap is not None
         return gain_above(self.protocol.gain.exact, self.messages.gain_cap, b, cap)
+
+
+def asked_leaders(leaders: MovingLeaders | None) -> Moving | None:
+    """Return how leaders move, as files have it; None of leaders at rest."""
+    return None if leaders is None else Moving(**{one.name: getattr(leaders, one.name) for one in fields(Moving)})
+
+
+def read_leaders(section: Moving) -> MovingLeaders:
+    """Return what a file says of how leaders move."""
+    return MovingLeaders(**vars(section))

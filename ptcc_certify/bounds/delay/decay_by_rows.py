@@ -1,4 +1,4 @@
-"""What is left of followers of single leaders under late messages, by one positive vector of theirs.
+"""What is left of followers of single leaders, while messages are late or leaders move, by one positive vector.
 
 With ``D_k u_k - q sum_l |w_kl| u_l >= b u_k``, ``cap <= ln q / (b age)`` and ``s_c`` the integral of ``min(gain, cap)``
 
@@ -9,6 +9,12 @@ for every gain that acts and all delays up to ``age``; ``initial`` is the larges
 off by ``speed age`` more; and there is added, inside the bracket,
 
     (speed + disturbance) / min u  int_0^t e^(-b (s_c(t) - s_c(r))) dr.
+
+Where nothing is late and the gain has no cap this is 0 at ``T``, and with ``p = b rho2 kappa`` before it
+
+    (speed + disturbance) / min u  (T - t) (1 - ((T - t)/T)^(p - 1)) / (p - 1).
+
+A sign term takes it up: followers that are on their targets at ``T`` stay there.
 """
 
 from __future__ import annotations
@@ -25,15 +31,17 @@ from lmi.errors import LMIError, NoCertificate
 from lmi.exact.decimal_rounding import float_up
 from lmi.exact.elementary_enclosures import log, rounded
 from ptcc_certify.bounds.delay.case import LateCase
-from ptcc_certify.bounds.tracking import drift_integral
 from ptcc_certify.checker.drift_by_leaders import drift_above
 from ptcc_certify.checker.input_formulas import BITS
 from ptcc_certify.lyapunov.late_follower_rows import FollowerRows, RowWitness
+from ptcc_certify.model.gain import Gain
 
 #: Up to so many followers many ``q`` are tried; beyond, the best of those that one vector proves.
 SEARCHED_FOLLOWERS = 3000
 #: Values of ``q`` that are tried, and the largest one; losses of ``b`` for a more even vector.
 _TRIED, _LARGEST_Q, _LOSSES = 10, 1e9, (0.01, 0.2, 0.6)
+#: The share of the time that is left where bounds of followers of moving leaders are compared.
+_JUDGED = 0.05
 #: What is added to a bound in floats, relatively and absolutely, so that it holds.
 MORE, LEAST = 1 + 1e-9, 1e-300
 
@@ -73,14 +81,17 @@ class RowBound:
     def decay(self, case: LateCase, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return ``e^(-b s_c)``, and what leaders that move and disturbances add in the bracket, (M,) floats each.
 
-        After ``T`` the gain is low again, and they add at most ``after``.
+        After ``T`` the gain is low again: from what they added by then they add ever more, at most ``after``.
         """
-        b, added = float(self.witness.b), np.zeros(t.shape)
-        if case.leaders is not None:
-            push = float(case.leaders.total) / float(self.witness.u.min())
-            before = push * drift_integral(case.protocol.gain, b, case.least_cap(self.cap), t)
-            later = math.inf if self.after is None else float(self.after)
-            added = np.where(t > float(case.protocol.T), later, before)
+        b, T, added = float(self.witness.b), float(case.protocol.T), np.zeros(t.shape)
+        if case.push:
+            push, cap = float(case.push) / float(self.witness.u.min()), case.least_cap(self.cap)
+            before = push * drift_integral(case.protocol.gain, b, cap, np.append(t, T))
+            low = case.exact.least_gain(always=True)
+            rate = b * float(low if cap is None else min(low, cap))
+            grown = -np.expm1(-rate * np.maximum(t - T, 0))
+            later = before[-1] * (1 - grown) + push / rate * grown
+            added = np.where(t > T, np.minimum(later, float(self.after or 0)), before[:-1])
         return np.exp(-b * case.limited(self.cap).clock(t)), added
 
     def deviation_bound(self, case: LateCase, t: np.ndarray) -> np.ndarray:
@@ -92,14 +103,66 @@ class RowBound:
         """Return what errors of values, leaders that move and disturbances add at most up to ``T``."""
         return self.floor + (self.after or 0) * case.exact.least_gain(always=True) / case.exact.least_gain()
 
-    def inputs(self, case: LateCase, rows: FollowerRows) -> np.ndarray:
-        """Bound ``gain (D_k |eps_k| + sum_l |w_kl| |eps_l(t - tau_kl)| + error D_k)`` of followers under a cap."""
+    def inputs(self, case: LateCase, rows: FollowerRows) -> np.ndarray | None:
+        """Bound ``gain (D_k |eps_k| + sum_l |w_kl| |eps_l(t - tau_kl)| + error D_k)`` of followers, and a sign term.
+
+        Under a cap, or where messages come at once and exactly, if ``gain e^(-b s)`` falls. None elsewhere.
+        """
         cap, u, b = case.messages.gain_cap, self.witness.u, float_up(self.witness.b)
-        assert cap is not None
+        sign = 0.0 if case.leaders is None else float_up(case.leaders.sign_gain or 0)
+        falling, most = None, case.exact.falling_input(self.witness.b, self.initial, Fraction(float(u.min())))
+        if most is not None and case.messages.vehicles is None:
+            falling = (rows.largest(u) * float_up(most) * MORE + sign) * MORE
+        if cap is None:
+            return falling
         y = float_up(self.initial * case.highest(self.witness.b, self.cap))
         floor, error = (float_up(cap * x) for x in (self.highest_floor(case), case.exact.wrong))
         wrong = floor * rows.largest(u) + error * rows.weights
-        return ((2 * rows.weights - b * (1 - 1e-15)) * u * y + wrong) * MORE + (LEAST if y or floor or error else 0)
+        whole = (2 * rows.weights - b * (1 - 1e-15)) * u * y + wrong + sign
+        whole = whole * MORE + (LEAST if y or floor or error else 0)
+        return np.asarray(whole if falling is None else np.minimum(whole, falling))
+
+
+def _decayed(remaining: np.ndarray, p: float) -> np.ndarray:
+    """Return ``int ((T - t)/(T - r))^p dr/T`` from 0 to ``t``, where ``1 - t/T`` is ``remaining``; 0 at ``T``."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(remaining > 0, (1 - remaining ** (p - 1)) / (p - 1) if p != 1 else -np.log(remaining), 0.0)
+    return np.asarray(remaining * np.maximum(share, 0))
+
+
+def drift_integral(gain: Gain, b: float, cap: Fraction | None, t: np.ndarray) -> np.ndarray:
+    """Bound ``int_0^t e^(-b (s_c(t) - s_c(r))) dr`` at instants up to ``T``, in floats.
+
+    Parameters
+    ----------
+    gain : Gain
+    b : float
+    cap : Fraction or None
+        ``s_c`` is the integral of ``min(gain, cap)``; None: of the gain.
+    t : (M,) array
+        In units of time, up to ``T``.
+
+    Returns
+    -------
+    (M,) array
+        In units of time.
+
+    Examples
+    --------
+    >>> gain = Gain(T=1, rho1=1, rho2=2, kappa=1)
+    >>> drift_integral(gain, 1.0, Fraction(2), np.array([0, 1])).round(4)  # (1 - e^-2)/2
+    array([0.    , 0.4323])
+    """
+    T, p = float(gain.T), b * float(gain.pole)
+    turn = 0.0
+    if cap is not None:
+        turn = 1.0 if cap <= gain.first else float(gain.pole / (cap - gain.rho1) / gain.T)
+    q = np.maximum(1 - t / T, 0)
+    before = T * _decayed(np.maximum(q, turn), p)
+    if cap is None:
+        return before
+    left = np.exp(-b * float(cap) * T * np.maximum(turn - q, 0))
+    return np.asarray(before * left + (1 - left) / (b * float(cap)))
 
 
 def away(case: LateCase, rows: FollowerRows) -> np.ndarray:
@@ -121,7 +184,7 @@ def away(case: LateCase, rows: FollowerRows) -> np.ndarray:
 def search_rows(case: LateCase, rows: FollowerRows, first: np.ndarray) -> tuple[RowBound, ...]:
     """Return the row bound that leaves least at ``T`` of those found, under a cap that of the least input, too.
 
-    Where leaders move that which leaves least after ``T``, too.
+    Where leaders move those which leave least before ``T``, and after it, too.
 
     Parameters
     ----------
@@ -154,12 +217,19 @@ def search_rows(case: LateCase, rows: FollowerRows, first: np.ndarray) -> tuple[
                 offer(best_q, loss)
     if not candidates:
         return ()
-    chosen = [min(candidates, key=_largest)]
-    if case.messages.gain_cap is not None:
-        chosen.append(min(candidates, key=lambda row: float(row.inputs(case, rows).max())))
+    near = np.array([float(case.protocol.T) * (1 - _JUDGED)])
+    aims = [_largest]
+    if any(row.inputs(case, rows) is not None for row in candidates):
+        aims.append(lambda row: _peak(row.inputs(case, rows)))
     if case.leaders is not None:
-        chosen.append(min(candidates, key=lambda row: float(row.residual(after=True).max())))
-    return tuple(dict.fromkeys(chosen))
+        aims.append(lambda row: float(row.residual(after=True).max()))
+    if case.leaders is not None and not case.messages.age:  # nothing is left at T without a cap
+        aims.append(lambda row: float(row.deviation_bound(case, near).max()))
+    return tuple(dict.fromkeys(min(candidates, key=aim) for aim in aims))
+
+
+def _peak(inputs: np.ndarray | None) -> float:
+    return math.inf if inputs is None else float(inputs.max())
 
 
 def _largest(bound: RowBound) -> float:
@@ -204,8 +274,8 @@ def row_bound(case: LateCase, rows: FollowerRows, first: np.ndarray, witness: Ro
     row = RowBound(witness, cap, case.clock(cap), case.left(witness.b, cap), initial, Fraction(floor * MORE))
     if case.leaders is None:
         return row
-    push = case.leaders.total / Fraction(float(witness.u.min()))
+    push = case.push / Fraction(float(witness.u.min()))
     drift = push * drift_above(case.protocol.gain.exact, witness.b, case.least_cap(cap))
     flattest = Fraction(float((1 / rows.slack(witness)).max()) * MORE)
-    after = flattest * case.leaders.total / case.exact.least_gain(always=True)
+    after = flattest * case.push / case.exact.least_gain(always=True)
     return replace(row, drift=rounded(drift, BITS, up=True), after=rounded(after, BITS, up=True))

@@ -1,6 +1,7 @@
-"""What holds with late messages: what is left at the deadline, by every kind of proof; who misses it; stages.
+"""What holds with late messages and moving leaders: what is left at the deadline, by every kind of proof; stages.
 
-Agents obey :mod:`ptcc_certify.model.late_messages`. Followers of single leaders are bounded row by row
+Agents obey :mod:`ptcc_certify.model.late_messages` and :mod:`ptcc_certify.model.moving_leaders`. Followers of single
+leaders are bounded row by row
 (:mod:`ptcc_certify.bounds.delay.decay_by_rows`) and from instant to instant
 (:mod:`ptcc_certify.bounds.delay.decay_by_steps`), all agents by a Lyapunov function of the whole graph.
 """
@@ -19,7 +20,7 @@ import numpy as np
 
 from lmi.errors import LMIError
 from lmi.exact.decimal_rounding import float_up, up
-from ptcc_certify.bounds.delay.case import LateCase
+from ptcc_certify.bounds.delay.case import LateCase, asked_leaders, read_leaders
 from ptcc_certify.bounds.delay.certain_misses import Missed, find_missed
 from ptcc_certify.bounds.delay.decay_by_rows import MORE, RowBound, away, search_rows
 from ptcc_certify.bounds.delay.decay_by_steps import Steps, bound_steps, search_steps
@@ -29,12 +30,11 @@ from ptcc_certify.bounds.delay.small_delays import SmallDelays
 from ptcc_certify.bounds.delay.staged_deadlines import stage_deadlines
 from ptcc_certify.bounds.envelope import instants_from_0
 from ptcc_certify.bounds.float_conversion import floats, floats_up
-from ptcc_certify.bounds.tracking import asked_leaders, read_leaders
 from ptcc_certify.bounds.virtual_positions import VehicleBounds, bound_vehicles, read_vehicles, vehicles_section
 from ptcc_certify.checker.delay_lmi import LateLMIWitness
 from ptcc_certify.checker.late_form import LateFormWitness
 from ptcc_certify.checker.late_messages import MessagesSection, StepsStart
-from ptcc_certify.checker.messages_asked import Delays, Moving, Packets
+from ptcc_certify.checker.messages_asked import Delays, Packets
 from ptcc_certify.checker.missed_deadline import Signs
 from ptcc_certify.checker.obligations import CheckReport
 from ptcc_certify.checker.section_declarations import RowVector, declared
@@ -45,7 +45,7 @@ from ptcc_certify.graphs.family import Family, pairs_of
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.late_follower_rows import FollowerRows, RowWitness
 from ptcc_certify.model.base import Protocol
-from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.late_messages import AtOnce, LateMessages
 from ptcc_certify.model.limited_gain import LimitedGain
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.virtual_positions import TrackingProtocol, Vehicles
@@ -54,7 +54,7 @@ from ptcc_certify.theorems.theorem import Obligation
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LateBounds:
-    """What is proved of a graph whose messages are late.
+    """What is proved of a graph or a family whose messages are late, or whose leaders move.
 
     Attributes
     ----------
@@ -111,6 +111,19 @@ class LateBounds:
     def structure(self) -> Structure | Family:
         """Of the graph, or the family."""
         return self.case.structure
+
+    @property
+    def tracks(self) -> bool:
+        """Whether leaders move, and nothing is late, lost or rounded."""
+        return isinstance(self.messages, AtOnce)
+
+    @property
+    def bounding_rho2(self) -> str | None:
+        """A ``rho2`` of few digits with which the input stays bounded while leaders move; None without a bound."""
+        if not self.rows:
+            return None
+        b, kappa = max(row.witness.b for row in self.rows), self.case.protocol.kappa
+        return up(1 / (b * kappa) * Fraction(1001, 1000), 3)
 
     @property
     def gain(self) -> LimitedGain:
@@ -316,11 +329,11 @@ def bound_late(case: LateCase) -> LateBounds:
     rows = late_rows(case)
     first, steps = away(case, rows), None
     found = search_rows(case, rows, first)
-    if messages.age and messages.vehicles is None and of_graph:
+    if messages.age and messages.vehicles is None and of_graph and not case.signed:
         with suppress(LMIError):
             steps = search_steps(case, rows, first)
     each = [one.residual() for one in (*found, steps) if one is not None]
-    inputs = [] if messages.gain_cap is None else [row.inputs(case, rows) for row in found]
+    inputs = [bound for bound in (row.inputs(case, rows) for row in found) if bound is not None]
     bounds = replace(bounds, rows=found, steps=steps, residual=_least(rows, each), input=_least(rows, inputs))
     if messages.vehicles is not None:
         return replace(bounds, vehicles=bound_vehicles(case, found, rows))
@@ -385,7 +398,7 @@ def delays(messages: LateMessages, of: SignedDigraph | Family, leaders: MovingLe
         own="late" if messages.own_delay else "fresh",
         value_error=messages.value_error,
         gain_cap=messages.gain_cap,
-        leaders=asked_leaders(leaders, Moving),
+        leaders=asked_leaders(leaders),
     )
 
 
@@ -457,6 +470,8 @@ def read_messages(section: Delays, structure: Structure | Family, vehicles: Vehi
     latency: Any = section.latency
     if isinstance(latency, Numbers):
         latency = dict(zip(pairs_of(of), latency, strict=True))
+    if section.leaders is not None and vehicles is None and not (section.delay or section.value_error):
+        return AtOnce(gain_cap=section.gain_cap)
     return LateMessages(
         delay=latency,
         period=None if packets is None else packets.period,

@@ -34,6 +34,9 @@ def late_facts(certificate: Certificate) -> Facts:
     late = certificate.proof.late
     if late is None:
         return
+    if late.tracks and late.leaders is not None:
+        yield from _tracking(late, late.leaders, certificate.at)
+        return
     yield from _vehicles(late)
     yield Fact(head="messages", note=messages_text(late.messages, certificate.protocol))
     if late.leaders is not None:
@@ -95,38 +98,32 @@ def _vehicles(late: LateBounds) -> Facts:
         yield Fact(head="agents", note=f"{name} at most {each}{whole}", detail=True)
 
 
-def tracking_facts(certificate: Certificate) -> Facts:
-    """Tell how followers track leaders that move."""
-    tracking = certificate.proof.tracking
-    if tracking is None:
-        if (
-            certificate.proof.asked_leaders is not None
-            and certificate.proof.late is None
-            and certificate.proof.asked_messages is None
-        ):
-            yield Fact(head="leaders", note=leaders_text(certificate.proof.asked_leaders))
-            text = "nothing is proved: no vector for the followers was found"
-            yield Fact(head="tracking", standing="unproved", note=text, loud=True)
+def _tracking(late: LateBounds, leaders: MovingLeaders, at: Fraction | None) -> Facts:
+    """Tell how followers track leaders that move, of which they hear at once."""
+    yield Fact(head="leaders", note=leaders_text(leaders))
+    if not late.rows:
+        text = "nothing is proved: no vector for the followers was found"
+        yield Fact(head="tracking", standing="unproved", note=text, loud=True)
         return
-    T = near(certificate.protocol.T)
-    yield Fact(head="leaders", note=leaders_text(tracking.leaders))
-    instants = {"0.9 T": Fraction(1, 10), "0.99 T": Fraction(1, 100)}
-    if (at := certificate.at) is not None:
-        instants = {f"t = {near(at)}": 1 - at / certificate.protocol.T}
-    bounds = {when: up(float(tracking.distance_bound([float(q)]).max()), 2) for when, q in instants.items()}
-    after = "and ever after" if not tracking.after else f"within {up(tracking.distance_after, 2)} of it from then on"
-    text = f"every follower on its target at T = {T}, {after}"
+    protocol, after = late.case.protocol, late.after or 0.0
+    if (cap := late.messages.gain_cap) is not None:
+        yield Fact(head="tracking", note=f"under a cap nothing settles: gain <= {near(cap)}")
+    where = f"within {up(late.largest, 2)} of its" if late.largest else "on its"
+    then = f"within {up(after, 2)} of it from then on" if after else "and ever after"
+    text = f"every follower {where} target at T = {near(protocol.T)}, {then}"
     yield Fact(head="tracking", note=text, brief=(f"{text};",))
-    whole = FROM_WITHIN_1.removeprefix(",") if tracking.relative else ""
-    within = ", ".join(f"{x} of it at {when}" for when, x in bounds.items())
+    instants = {"0.9 T": protocol.T * 9 / 10, "0.99 T": protocol.T * 99 / 100}
+    if at is not None:
+        instants = {f"t = {near(at)}": at}
+    whole = FROM_WITHIN_1.removeprefix(",") if late.relative else ""
+    bounds = late.largest_bound([float(t) for t in instants.values()]).tolist()
+    within = ", ".join(f"{up(x, 2)} of it at {when}" for when, x in zip(instants, bounds, strict=True))
     yield Fact(head="tracking", note=f"before T within {within}{whole}")
-    if tracking.input is not None:
-        largest = float(tracking.input.max())
-        text = f"bounded up to T; |u_k| <= {up(largest, 4)}{whole}"
-        yield Fact(head="input", value=largest, side="up", note=text)
+    if late.inputs is not None:
+        largest = float(late.inputs.max())
+        yield Fact(head="input", value=largest, side="up", note=f"bounded up to T; |u_k| <= {up(largest, 4)}{whole}")
     else:
-        mend = Change("rho2", str(tracking.bounding_rho2))
-        note = ("not proved bounded while leaders move; ", mend, " bounds it")
+        note = ("not proved bounded while leaders move; ", Change("rho2", late.bounding_rho2), " bounds it")
         yield Fact(head="input", standing="unproved", note=note, loud=True)
 
 

@@ -22,7 +22,7 @@ from ptcc_certify.report.facts.decay import (
 )
 from ptcc_certify.report.facts.graph import family_facts, graph_facts
 from ptcc_certify.report.facts.input import disturbed_facts, family_input_facts, input_facts
-from ptcc_certify.report.facts.late import late_facts, tracking_facts
+from ptcc_certify.report.facts.late import late_facts
 from ptcc_certify.report.facts.sliding import sliding_facts
 from ptcc_certify.report.facts.states import family_final_facts, final_facts, initial_facts
 from ptcc_certify.report.facts.verdict import protocol_facts, run_facts, verdict_facts
@@ -80,7 +80,6 @@ def _answers(certificate: Certificate, origins: Mapping[str, str], details: bool
     yield from initial_facts(certificate, origins, alone=certificate.only_drawn)
     yield from sliding_facts(labels, protocol.reaching, certificate.sigma0, certificate.proof.reaching)
     yield from late_facts(certificate)
-    yield from tracking_facts(certificate)
     beside = _beside(certificate)
     if certificate.of_family:
         components = [part.component for part in certificate.family_proof.parts]

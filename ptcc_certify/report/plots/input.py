@@ -161,14 +161,9 @@ def _peaks(run: Trajectory, certificate: Certificate) -> list[Peak]:
     peak = None if run.vehicles else _certified_peak(run, certificate)  # which is of the virtual positions then
     found = [] if peak is None else [Peak(peak, f"certified peak {up(peak, 4)}{_set_text(run, certificate)}")]
     if late is not None and (largest := largest_late_input(late, certificate.protocol)) is not None:
-        whole = ", from within 1 of the final states" if late.relative else ""
-        what = "as asked" if late.messages.exact else "late messages"
+        whole = f", from within 1 of the {'targets' if late.tracks else 'final states'}" if late.relative else ""
+        what = "moving leaders" if late.tracks else "as asked" if late.messages.exact else "late messages"
         found.append(Peak(float(largest), f"{what}: at most {up(largest, 4)}{whole}", BOUND))
-    leads = run.conditions.leaders is not None and run.conditions.messages is None
-    tracking = certificate.proof.tracking if leads else None
-    if tracking is not None and tracking.input is not None:
-        most = float(tracking.input.max())
-        found.append(Peak(most, f"moving leaders: at most {up(most, 4)}", BOUND))
     return found
 
 

@@ -184,8 +184,9 @@ def limits_text(run: Trajectory, certificate: Certificate | None) -> str:
         flawed = "late messages" if late is None else late.messages.name
         forced = certificate.sigma0 is None and met.forcing is None and leaders is None
         absent = {
-            "without the limits of the gain": limits is None and certificate.limits,
-            f"without {flawed}": messages is None and certificate.proof.late and not vehicles,
+            "without the limits of the gain": limits is None
+            and (certificate.limits or (late and late.tracks and late.gain.bounded)),
+            f"without {flawed}": messages is None and late is not None and not (late.messages.exact or vehicles),
             "leaders at rest": leaders is None and certificate.proof.leaders_move,
             "without disturbance": forced and certificate.delta,
             "without noise": forced and certificate.noise,

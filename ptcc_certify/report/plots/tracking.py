@@ -8,7 +8,6 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ptcc_certify.bounds.delay.late_messages import LateBounds
-from ptcc_certify.bounds.tracking import Tracking
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import Change, ParameterError
 from ptcc_certify.report.plots.decay import NONE, NothingDecays
@@ -70,67 +69,63 @@ def plot_tracking(subject: Any, *, ax: Axes | None = None, time_unit: str = "") 
     ['worst leaders', 'proved bound', '$T$']
     """
     certificate = subject if certifies_family(subject) else certificate_of(subject)
-    late, tracking, x0 = certificate.proof.late, certificate.proof.tracking, certificate.initial_state
-    late = late if late is not None and late.says_something else None
-    if late is None and tracking is None:
+    late, x0 = certificate.proof.late, certificate.initial_state
+    if late is None or not late.says_something:
         what = "the certificate says nothing of late messages or of leaders that move; certify with "
         raise ParameterError((what, Change("delay"), " or ", Change("leader_speed")))
     T = float(certificate.protocol.T)
     t = np.linspace(0, T, 401)
-    if late is not None and (late.of_followers or late.of_all) and late.largest_bound(t).max() < _NOTHING:
+    if (late.of_followers or late.of_all) and late.largest_bound(t).max() < _NOTHING:
         raise NothingDecays(NONE)
     ax = axes_of(ax)
     if not certificate.of_family:
-        if x0 is None or (late is not None and certificate.proof.final_state is None):
+        if x0 is None or certificate.proof.final_state is None:
             raise ParameterError("the certificate has no initial state to run from; certify with x0")
         t = _draw_runs(ax, certificate, late, [float(x) for x in x0])
-    if late is not None:
-        _draw_late_bound(ax, late, t)
-    elif tracking is not None:
-        ax.plot(t, _tracking_bound(tracking, t, T), color=BOUND, linewidth=1.8, label="proved bound")
+    _draw_bound(ax, late, t)
+    if late.tracks:
         ax.axvline(T, color=BEHIND, linewidth=0.8, linestyle=":", label="$T$")
         ax.set_ylim(bottom=0)
     ax.set_xlim(0, t[-1])
-    moving = "" if late is not None and late.leaders is None else "(t)"
+    moving = "" if late.leaders is None else "(t)"
     return finished(ax, time_label("time $t$", time_unit), rf"$\max_k |x_k(t) - x_k^*{moving}|$")
 
 
-def _draw_runs(ax: Axes, certificate: Certificate, late: LateBounds | None, start: list[float]) -> np.ndarray:
+def _draw_runs(ax: Axes, certificate: Certificate, late: LateBounds, start: list[float]) -> np.ndarray:
     """Draw the runs of one graph; return their instants."""
     nodes, ends = certificate.graph_proof.structure.followers, np.asarray(certificate.proof.final_state, dtype=float)
-    if not nodes.size or (late is not None and (late.vehicles is not None or late.of_all)):
+    if not nodes.size or late.vehicles is not None or late.of_all:
         nodes = np.arange(certificate.graph_proof.graph.n_nodes)
     t = np.linspace(0, float(certificate.protocol.T), 401)
-    for run, style in _runs(certificate, late, certificate.proof.tracking, start):
+    for run, style in _runs(certificate, late, start):
         aims = ends[:, None] if run.targets is None else run.targets
         ax.plot(run.t, np.abs(run.states - aims)[nodes].max(axis=0), **style)
         t = run.t
     return t
 
 
-def _runs(
-    certificate: Certificate, late: LateBounds | None, tracking: Tracking | None, start: list[float]
-) -> list[tuple[Trajectory, dict[str, Any]]]:
+def _runs(certificate: Certificate, late: LateBounds, start: list[float]) -> list[tuple[Trajectory, dict[str, Any]]]:
     """Return the runs that are drawn, and how."""
     graph, protocol = certificate.graph_proof.graph, certificate.protocol
-    if late is not None and late.vehicles is not None:
+    if late.vehicles is not None:
         seen = certificate.asked_trajectory
         return [] if seen is None else [(seen, {"color": RUN, "linewidth": 1.1, "label": "vehicles"})]
-    if late is not None:
-        drawn = _RUNS if can_run(protocol, late.messages) else {}
-        more = {"leaders": late.leaders}
-        return [
-            (simulate_late(graph, protocol, late.messages, start, pattern=pattern, **more), style)  # type: ignore[arg-type]
-            for pattern, style in drawn.items()
-        ]
-    assert tracking is not None
-    run = simulate_tracking(graph, protocol, tracking.leaders, start, u=tracking.witness.u, steps=400)
-    return [(run, {"color": RUN, "linewidth": 1.1, "label": "worst leaders"})]
+    if late.tracks and late.leaders is not None:
+        u, cap = late.rows[0].witness.u, late.messages.gain_cap
+        run = simulate_tracking(graph, protocol, late.leaders, start, u=u, steps=400, gain_cap=cap)
+        return [(run, {"color": RUN, "linewidth": 1.1, "label": "worst leaders"})]
+    drawn = _RUNS if can_run(protocol, late.messages) and not late.case.signed else {}
+    more = {"leaders": late.leaders}
+    return [
+        (simulate_late(graph, protocol, late.messages, start, pattern=pattern, **more), style)  # type: ignore[arg-type]
+        for pattern, style in drawn.items()
+    ]
 
 
-def _draw_late_bound(ax: Axes, late: LateBounds, t: np.ndarray) -> None:
-    """Draw what is proved with late messages, and what is the least that a bound can be."""
-    ax.set_yscale("log")
+def _draw_bound(ax: Axes, late: LateBounds, t: np.ndarray) -> None:
+    """Draw what is proved, and what is the least that a bound can be."""
+    if not late.tracks:
+        ax.set_yscale("log")
     if late.of_followers or late.of_all:
         over_time = late.largest_bound(t)
         ax.plot(t, over_time, color=BOUND, linewidth=1.8, label="proved bound")
@@ -142,11 +137,3 @@ def _draw_late_bound(ax: Axes, late: LateBounds, t: np.ndarray) -> None:
     if late.missed is not None and late.missed.bound >= _SEEN * late.largest:
         marks: dict[str, Any] = {"marker": "v", "color": BOUND, "linestyle": "none", "markersize": 4, "clip_on": False}
         ax.plot(t[-1:], [float(late.missed.bound)], label="at least, if as late as allowed", **marks)
-
-
-def _tracking_bound(tracking: Tracking, t: np.ndarray, T: float) -> np.ndarray:
-    """Return the bound before T, and from there on."""
-    before = tracking.distance_bound(np.maximum(1 - t / T, 0)).max(axis=0)
-    rate = float(tracking.witness.b * tracking.protocol.gain.rho1)
-    later = -np.expm1(-rate * np.maximum(t - T, 0))  # m' <= -a rho1 m + c from m(T) = 0
-    return np.where(t <= T, before, tracking.distance_after * later)
