@@ -20,6 +20,7 @@ A sign term takes it up: followers that are on their targets at ``T`` stay there
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -109,7 +110,7 @@ class RowBound:
         Under a cap, or where messages come at once and exactly, if ``gain e^(-b s)`` falls. None elsewhere.
         """
         cap, u, b = case.messages.gain_cap, self.witness.u, float_up(self.witness.b)
-        sign = 0.0 if case.leaders is None else float_up(case.leaders.sign_gain or 0)
+        sign = 0.0 if case.leaders is None else float_up(case.leaders.sign_gain or Fraction(0))
         falling, most = None, case.exact.falling_input(self.witness.b, self.initial, Fraction(float(u.min())))
         if most is not None and case.messages.vehicles is None:
             falling = (rows.largest(u) * float_up(most) * MORE + sign) * MORE
@@ -218,7 +219,7 @@ def search_rows(case: LateCase, rows: FollowerRows, first: np.ndarray) -> tuple[
     if not candidates:
         return ()
     near = np.array([float(case.protocol.T) * (1 - _JUDGED)])
-    aims = [_largest]
+    aims: list[Callable[[RowBound], float]] = [_largest]
     if any(row.inputs(case, rows) is not None for row in candidates):
         aims.append(lambda row: _peak(row.inputs(case, rows)))
     if case.leaders is not None:
