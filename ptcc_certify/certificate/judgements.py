@@ -196,8 +196,11 @@ def judge_limits(proof: GraphProof) -> list[Answer]:
 
 
 def at_deadline(proof: GraphProof | FamilyProof, answer: Answer) -> Answer:
-    """Return what becomes at ``T``, where messages are late, of a behaviour that follows where none are."""
+    """Return what becomes at ``T``, where messages are late or leaders move, of a behaviour that follows elsewhere."""
     late = proof.late
+    if late is not None and late.tracks and late.largest and answer.status == MET:
+        why = "nothing is proved of that" if math.isinf(late.largest) else "nothing settles under a cap"
+        return Answer(OPEN, f"{answer.what} at T while leaders move", why)
     if proof.asked_messages is None or answer.status != MET or proof.constant:
         return answer
     what = f"{answer.what} at T with {proof.asked_messages.name}"

@@ -864,3 +864,29 @@ def test_a_saved_certificate_says_that_information_arrives_too_late_for_stages()
     assert made.code == 0 and "no deadlines of stages" in made.out
     read = read_certificate("c.json")
     assert read.late is not None and read.late.unarrived and "no deadlines of stages" in read.summary()
+
+
+def test_under_a_cap_leaders_that_move_are_nearly_tracked_and_no_behaviour_is_met() -> None:
+    asked = (*QUICK, *START, "--leader-speed", "0.5")
+    run = ptcc("certify", "team.csv", *asked, "--gain-cap", "20", "--expect", "bipartite-containment", "-o", "c.json")
+    text = " ".join(run.out.split())
+    assert run.code == 4 and "nothing settles under a cap" in text and "under a cap nothing settles: gain <= 20" in text
+    assert ptcc("check", "c.json").code == 0
+    late, free = read_certificate("c.json").late, certify("team.csv", NominalProtocol(), leaders=MovingLeaders("0.5"))
+    assert late is not None and late.tracks and 0 < late.largest < 0.3 and free.late.largest == 0
+    assert ptcc("plot", "c.json", "-o", "c.svg").code == 0
+    assert "proved at" not in Path("c.svg").read_text(encoding="utf-8")
+    run = ptcc("simulate", "team.csv", *START, "--leader-speed", "0.5", "--gain-cap", "20", "-o", "run.csv")
+    assert run.code == 0 and "target(" in Path("run.csv").read_text(encoding="utf-8")
+    met = ptcc("certify", "team.csv", *asked, "--expect", "bipartite-containment")
+    assert met.code == 0 and "met: bipartite containment" in " ".join(met.out.split())
+
+
+def test_a_sign_term_takes_up_how_leaders_move_where_messages_are_late_too() -> None:
+    asked = ("certify", "team.csv", *QUICK, *START, "--leader-speed", "0.5", "--delay", "0.01")
+    signed, plain = ptcc(*asked, "--sign-gain", "0.5", "-o", "s.json"), ptcc(*asked, "-o", "p.json")
+    assert signed.code == plain.code == 0 and ptcc("check", "s.json").code == 0
+    one, other = (read_certificate(name).late for name in ("s.json", "p.json"))
+    assert one is not None and other is not None and one.after is not None and other.after is not None
+    assert one.after < other.after and one.steps is None and one.leaders.sign_gain == Fraction(1, 2)
+    assert ptcc("plot", "s.json", "-o", "s.svg").code == 0

@@ -129,7 +129,7 @@ def _draw_bound(ax: Axes, late: LateBounds, t: np.ndarray) -> None:
     if late.of_followers or late.of_all:
         over_time = late.largest_bound(t)
         ax.plot(t, over_time, color=BOUND, linewidth=1.8, label="proved bound")
-        nearer = 0 < late.largest < _NEARER * float(over_time[-1])
+        nearer = not late.tracks and 0 < late.largest < _NEARER * float(over_time[-1])
     else:
         nearer = late.form is not None
     if nearer:  # another proof, which says nothing of what is before T
