@@ -282,6 +282,7 @@ def late(draw: Draw) -> tuple[int, list[str], dict[str, str]]:
     if way < 0.6 and draw.random() < 0.25:
         command += ["--leader-speed", draw.number(0.01, 2), *draw.sometimes(0.3, "--sign-gain", draw.number(1, 5))]
     command += draw.sometimes(0.25, "--max-residual", draw.number(1e-6, 1))
+    command += draw.sometimes(0.2, "--delta", draw.number(0.01, 1)) + draw.sometimes(0.2, "--noise", "0.01")
     return graph.n_nodes, command, {"g.csv": text_of(graph, delays)}
 
 
@@ -293,7 +294,7 @@ def leaders(draw: Draw) -> tuple[int, list[str], dict[str, str]]:
     speed = draw.number(0.01, 2)
     command += ["--leader-speed", speed, *draw.sometimes(0.3, "--delta", draw.number(0.01, 1))]
     command += draw.sometimes(0.3, "--sign-gain", draw.number(0.1, 5))
-    command += draw.sometimes(0.3, "--gain-cap", draw.number(2, 50))
+    command += draw.sometimes(0.3, "--gain-cap", draw.number(2, 50)) + draw.sometimes(0.2, "--noise", "0.01")
     return graph.n_nodes, command, {"g.csv": text_of(graph)}
 
 
@@ -312,6 +313,7 @@ def beside(draw: Draw) -> tuple[int, list[str], dict[str, str]]:
     if not late or draw.random() < 0.4:
         command += ["--leader-speed", draw.number(0.01, 2), *draw.sometimes(0.3, "--delta", draw.number(0.01, 1))]
         command += draw.sometimes(0.3, "--sign-gain", draw.number(0.1, 5))
+    command += draw.sometimes(0.3, "--noise", draw.number(0.001, 0.1))
     return family.n_nodes, command, files
 
 

@@ -100,8 +100,8 @@ def certify(
         single leaders, leader groups that hear each other at once, or a cap; ``sigma(0) = 0`` under the sliding-mode
         protocol.
     leaders : MovingLeaders, optional
-        Nominal protocol, single leaders: how fast these move; how followers track them is bounded. With ``messages``
-        without a sign term; what is left at the deadline is then bounded.
+        Nominal protocol, single leaders: how fast these move; how followers track them is bounded, with ``messages``
+        and under a cap what is left at the deadline.
     limits : GainLimits or sequence of GainLimits
         Nominal protocol: caps, stops and sampling of the gain, under which what is left at the deadline is bounded.
         With sampling, which may drive agents apart, it is certified if ``||E||`` is no larger there than at first.
@@ -172,7 +172,7 @@ def certify_case(
     Certificate
     """
     origins = origins_of(case.graph, case.initial) | dict(origins or {})
-    case = with_vehicles(case.with_plain_agents()).with_leaders_heard()
+    case = with_vehicles(case.with_plain_agents()).with_rows()
     _refuse_before_reading(case)
     progress, family = listener(progress), _read_family(case)
     graph = as_graph(case.graph) if family is None else family.modes[0].mandatory

@@ -214,7 +214,9 @@ def at_deadline(proof: GraphProof | FamilyProof, answer: Answer) -> Answer:
     if late.staged:
         return Answer(OPEN, what, "with deadlines of stages it holds, with one for all none is proved to hold it")
     if late.leaders is not None:
-        return Answer(OPEN, what, "leaders move, so that nobody is proved to settle")
+        moving = late.leaders.speed > 0
+        why = "leaders move, so that nobody is proved to settle" if moving else "disturbances leave something at T"
+        return Answer(OPEN, what, why)
     if late.messages.gain_cap is not None:
         return Answer(OPEN, what, "nothing settles under a cap")
     return Answer(OPEN, what, "nobody is proved to settle at T")

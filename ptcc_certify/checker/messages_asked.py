@@ -177,7 +177,10 @@ def read_messages(gain: PrescribedGain, section: Delays) -> Messages:
     need(delay == age, "delay is not the largest age of what is heard")
     virtual = getattr(section, "vehicles", None) is not None
     leaders = section.leaders
-    need(virtual or leaders is not None or delay > 0 or section.value_error > 0, "nothing is late or off, and leaders rest")
+    need(
+        virtual or leaders is not None or delay > 0 or section.value_error > 0,
+        "nothing is late or off, and leaders rest",
+    )
     if leaders is not None and leaders.sign_gain is not None:
         need(leaders.sign_gain >= leaders.speed + leaders.disturbance, "sign_gain is below speed + disturbance")
         need(not virtual and section.own == "fresh", "a sign term of virtual positions, or of a late own state")

@@ -285,6 +285,8 @@ def certify_family(
         origins = {"graph": Path(name).name, "read": read, **random_states}
         asks = Asks(time_limit=options["time_limit"], expectations=expected)
         beside: dict[str, Any] = {"messages": messages_of(graphs, family, options), "leaders": leaders_of(options)}
+        if options["kind"] == "nominal":
+            asks = replace(asks, noise=options["noise"], delta=None if beside["leaders"] else options["delta"])
         if beside["messages"] is None and beside["leaders"] is not None and options["gain_cap"] is not None:
             beside["limits"] = GainLimits(gain_cap=options["gain_cap"])
         if beside["messages"] is not None and isinstance(beside["messages"].delay, Mapping):
@@ -337,9 +339,11 @@ def refuse_options(options: shared.Options) -> None:
     source = click.get_current_context().get_parameter_source
     foreign = [*_NOT_OF_FAMILIES]
     if options["kind"] == "nominal":
-        foreign += ["disturbance"] if asks_for_leaders(options) else ["disturbance", "delta"]
-    if asks_for_messages(options) or asks_for_leaders(options) or exchanges_virtual(options):
-        foreign.remove("gain_cap")
+        foreign += ["disturbance", "delta"]
+    by_rows = asks_for_messages(options) or asks_for_leaders(options)
+    if by_rows or exchanges_virtual(options):
+        taken = ("gain_cap", "delta", "noise") if by_rows else ("gain_cap",)
+        foreign = [name for name in foreign if name not in taken]
     for name in foreign:
         given = source(name) in (ParameterSource.COMMANDLINE, ParameterSource.DEFAULT_MAP)
         if given and options[name] not in (None, False):

@@ -114,10 +114,12 @@ class Asks:
         The set of initial states for which the input is bounded, instead of the initial state alone; a number ``R``
         stands for ``||X(0)||_inf <= R``.
     delta : number, optional
-        Nominal protocol: bound of the disturbances ``|d_k|`` whose effect is bounded, in units of the input.
+        Nominal protocol: bound of the disturbances ``|d_k|`` whose effect is bounded, in units of the input;
+        where messages are late or leaders move, in what is bounded of these.
     noise : number, optional
         Nominal protocol: bound of the measurement noise ``|n_k|``, ``u = -gain L (X + n)``, whose effect is bounded
-        under each limit of the gain but sampling. Noise times an infinite gain is bounded by nothing.
+        under each limit of the gain but sampling. Noise times an infinite gain is bounded by nothing. Where messages are
+        late or leaders move it is an error of values of twice this.
     disturbance : Disturbance, str, number, callable or sequence, optional
         Sliding mode: what the simulated run meets; see :func:`ptcc_certify.simulation.run.simulate`.
     simulation : bool, optional

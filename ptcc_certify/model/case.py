@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from ptcc_certify.checker.input_formulas import Limits
@@ -17,6 +17,7 @@ from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.model.late_messages import AtOnce, LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.parameters import parameter
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,18 +102,35 @@ class Case:
             return replace(self, agents=None)
         return self if self.sliding else replace(self, agents=None, limits=self.limits_with(self.agents))
 
-    def with_leaders_heard(self) -> Case:
-        """Return the case, where leaders move, with messages that come at once if nothing else is told of them.
+    def with_rows(self) -> Case:
+        """Return the case with all that is asked beside late messages and moving leaders told as part of these.
 
-        Then a cap of the gain is that of these messages.
+        Disturbances are those of the followers of leaders, which may rest; noise within NU is an error of values of 2
+        NU; and leaders of which nothing is heard late send :class:`AtOnce` messages, with a cap of the gain alone.
+
+        Examples
+        --------
+        >>> noisy = Asks(noise="0.1", delta=1)
+        >>> case = Case("fig1a", NominalProtocol(), messages=LateMessages("0.01"), asks=noisy).with_rows()
+        >>> case.messages, case.leaders, case.asks.noise, case.asks.delta
+        (LateMessages(delay=1/100, value_error=1/5), MovingLeaders(speed=0, disturbance=1), None, None)
         """
-        if self.leaders is None or self.messages is not None:
+        messages, leaders, asks = self.messages, self.leaders, self.asks
+        if (messages is None and leaders is None) or self.sliding:
             return self
+        if asks.delta is not None and (leaders is None or not leaders.disturbance):
+            speed, sign = (0, None) if leaders is None else (leaders.speed, leaders.sign_gain)
+            leaders, asks = MovingLeaders(speed, asks.delta, sign), replace(asks, delta=None)
         caps = {entry.gain_cap for entry in self.limits}
         alone = all(entry.stop_before is None and entry.sample_period is None for entry in self.limits)
-        if len(caps) > 1 or not alone:
-            return self
-        return replace(self, messages=AtOnce(gain_cap=next(iter(caps), None)), limits=())
+        limits = self.limits
+        if messages is None and len(caps) < 2 and alone:
+            messages, limits = AtOnce(gain_cap=next(iter(caps), None)), ()
+        if asks.noise is not None and messages is not None:
+            error = messages.value_error + 2 * parameter("noise", asks.noise)
+            told: dict[str, Any] = {part.name: getattr(messages, part.name) for part in fields(messages) if part.init}
+            messages, asks = LateMessages(**told | {"value_error": error}), replace(asks, noise=None)
+        return replace(self, messages=messages, leaders=leaders, asks=asks, limits=limits)
 
     def limits_with(self, agents: Agents) -> tuple[Limits, ...]:
         """Return the limits of the gain with the cap of agents, if they have one."""

@@ -41,21 +41,15 @@ _NOT_LATE = {
     "initial_set": _NO_SET,
     "stop_before": "late messages are certified under a gain cap alone; leave it out",
     "sample_period": "of late messages a period tells how often they are sent; give that instead",
-    "noise": "of late messages an error of values tells it: noise within NU is one of 2 NU, a quantisation of 4 NU; "
-    "give that instead",
-    "delta": "is not proved of late messages under the nominal protocol by itself; give leaders with it, of speed 0 if "
-    "they rest, or take the sliding-mode protocol, under which disturbances within delta move nothing",
+    "delta": "is given twice: MovingLeaders(disturbance=..) tells what disturbs the followers; leave one of them out",
 }
 _CAPPED = "followers of leaders that move are certified under one gain cap alone; leave it out"
 #: What is not certified beside leaders that move.
 _NOT_TRACKING = {
     "initial_set": _NO_SET,
     **dict.fromkeys(("gain_cap", "stop_before", "sample_period"), _CAPPED),
-    "noise": "while leaders move an error of values tells it: noise within NU is one of 2 NU, a quantisation of 4 NU; "
-    "give that instead",
-    "delta": "of leaders that move MovingLeaders(disturbance=..) tells what disturbs the followers; give that instead",
+    "delta": _NOT_LATE["delta"],
 }
-_NOT_TOGETHER = _NOT_LATE | {"delta": _NOT_TRACKING["delta"]}
 
 
 def refuse_before_the_graph(case: Case) -> None:
@@ -177,9 +171,10 @@ def refuse_beside(structure: Structure, case: Case) -> None:
     if messages is None and leaders is None:
         return
     late = messages is not None and (messages.flawed or messages.vehicles is not None)
-    _refuse_more(_NOT_LATE if leaders is None else _NOT_TOGETHER if late else _NOT_TRACKING, case)
+    _refuse_more(_NOT_LATE if late else _NOT_TRACKING, case)
     if leaders is not None:
-        refuse_leader_groups(structure, "leaders that move as they like: a bound")
+        what = "leaders that move as they like" if leaders.speed else "disturbances where messages are late"
+        refuse_leader_groups(structure, f"{what}: a bound")
     if messages is not None:
         _refuse_messages(structure, messages, [limit.gain_cap for limit in case.limits])
     if structure.graph.n_edges == 0:

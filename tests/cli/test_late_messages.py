@@ -257,13 +257,15 @@ def test_agents_that_begin_on_their_targets_are_not_said_to_get_little_nearer(wo
         (("team.csv", "--leader-speed", "1", "--initial-bound", "1"), "--initial-bound is not taken up"),
         (("team.csv", "--delay", "0.1", "--stop-before", "0.1"), "--stop-before: late messages are certified under a"),
         (("team.csv", "--delay", "0.1", "--sample-period", "0.1"), "--sample-period: of late messages a period tells"),
-        (("team.csv", "--delay", "0.1", "--gain-cap", "9", "--noise", "1"), "a quantisation of 4 NU"),
-        (("team.csv", "--delay", "0.1", "--delta", "1"), "delta is not proved of late messages under the nominal"),
+        (("group.csv", "--delay", "0.1", "--gain-cap", "9", "--noise", "1"), "what values that are off add: a bound"),
+        (
+            ("group.csv", "--delay", "0.1", "--delta", "1"),
+            "disturbances where messages are late: a bound needs leaders",
+        ),
         (
             ("team.csv", "--leader-speed", "1", "--stop-before", "0.1"),
             "certified under one gain cap alone; leave it out",
         ),
-        (("team.csv", "--leader-speed", "1", "--noise", "1"), "noise: while leaders move an error of values tells it"),
         (("team.csv", "--uncertainty", "1%", "--delay", "none"), 'no column "none"; add it, or name one of source'),
         (("team.csv", "--uncertainty", "1%", "--delta", "1"), "--delta is for one graph, not for families yet"),
         (("team.csv", "--uncertainty", "1%", "--gain-cap", "9"), "--gain-cap is for one graph, not for families yet"),
@@ -290,7 +292,6 @@ def test_agents_that_begin_on_their_targets_are_not_said_to_get_little_nearer(wo
         (("group.csv", "--leader-speed", "1", "--delay", "1"), "leaders that move as they like: a bound needs leaders"),
         (("group.csv", "--leader-speed", "1", "--delay", "1", "--gain-cap", "9"), "a and b are leaders of one group"),
         (("team.csv", "--leader-speed", "1", "--delay", "1", "--stop-before", "0.1"), "--stop-before: late messages"),
-        (("team.csv", "--leader-speed", "1", "--delay", "1", "--noise", "1", "--gain-cap", "9"), "of 4 NU"),
         (
             ("team.csv", "--delay", "1", "--agents", "double-integrator"),
             "--delay: is not proved of agents of order n; let them exchange virtual positions: --exchange virtual; or",
@@ -654,8 +655,8 @@ def test_families_and_other_limits_are_refused_in_python_too() -> None:
         certify(pair, protocol, uncertainty="10%", asks=Asks(expectations=Expectations(max_residual=1)))
     with pytest.raises(ParameterError, match="gain_cap: limits and late messages have two"):
         certify(pair, protocol, messages=each, limits=same)
-    with pytest.raises(ParameterError, match=r"MovingLeaders\(disturbance=..\)"):
-        certify(pair, protocol, leaders=MovingLeaders(speed=1), asks=Asks(delta=1))
+    with pytest.raises(ParameterError, match=r"delta is given twice: MovingLeaders\(disturbance=..\)"):
+        certify(pair, protocol, leaders=MovingLeaders(speed=1, disturbance=1), asks=Asks(delta=1))
 
 
 def test_late_messages_ask_for_sliding_variables_at_0() -> None:
@@ -890,3 +891,26 @@ def test_a_sign_term_takes_up_how_leaders_move_where_messages_are_late_too() -> 
     assert one is not None and other is not None and one.after is not None and other.after is not None
     assert one.after < other.after and one.steps is None and one.leaders.sign_gain == Fraction(1, 2)
     assert ptcc("plot", "s.json", "-o", "s.svg").code == 0
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--delay", "0.01", "--delta", "0.2"),
+        ("--delay", "0.01", "--noise", "0.05", "--gain-cap", "20"),
+        ("--leader-speed", "0.5", "--noise", "0.05", "--delta", "0.2"),
+        ("--uncertainty", "1%", "--delay", "0.01", "--delta", "0.2", "--noise", "0.05"),
+    ],
+)
+def test_disturbances_and_noise_go_with_late_messages_and_leaders_that_move(words: tuple[str, ...]) -> None:
+    quick = QUICK[:4] if "--uncertainty" in words else QUICK
+    run = ptcc("certify", "team.csv", *words, *START, *quick, "--expect", "bipartite-containment", "-o", "c.json")
+    assert run.code == 4 and "left open: bipartite containment at T with" in " ".join(run.out.split()), run
+    late = read_certificate("c.json").late
+    assert late is not None and late.messages.value_error == (Fraction(1, 10) if "--noise" in words else 0)
+    pushed = Fraction(0) if late.leaders is None else late.leaders.disturbance
+    assert pushed == (Fraction(1, 5) if "--delta" in words else 0)
+    assert ptcc("check", "c.json").code == 0 == ptcc("report", "c.json", "-o", "c.html").code
+    page = Path("c.html").read_text(encoding="utf-8")
+    assert ("leaders at rest" in page) == ("--leader-speed" in words)
+    assert ("without disturbances" in page) == ("--delta" in words)

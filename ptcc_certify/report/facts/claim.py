@@ -66,7 +66,7 @@ def assumptions(certificate: Certificate) -> list[str]:
         "of virtual positions": virtual,
         "without a gain cap": not limits and messages is not None and messages.gain_cap is not None,
         without_flaws(messages): messages is not None and not messages.exact,
-        "leaders at rest": certificate.proof.leaders_move,
+        "leaders at rest": leaders is not None and leaders.speed > 0,
         "without disturbances": leaders is not None and leaders.disturbance > 0,
         "without sign(e_k)": leaders is not None and leaders.sign_gain is not None,
     }

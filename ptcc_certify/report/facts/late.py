@@ -135,7 +135,7 @@ def leaders_text(leaders: MovingLeaders) -> str:
     >>> leaders_text(MovingLeaders(speed="0.5", disturbance=1))
     "speed |x_j'| <= 0.5; any |d_k| <= 1"
     """
-    clauses = [f"speed |x_j'| <= {near(leaders.speed)}"]
+    clauses = [f"speed |x_j'| <= {near(leaders.speed)}" if leaders.speed else "at rest"]
     if leaders.disturbance > 0:
         clauses.append(f"any |d_k| <= {near(leaders.disturbance)}")
     if leaders.sign_gain is not None:

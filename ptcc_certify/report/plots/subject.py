@@ -154,13 +154,14 @@ def structure_of(subject: Any) -> Structure:
 
 def ideal_text(certificate: Certificate) -> str:
     """Say what of a certificate is not in its bounds over time: limits of the gain, late messages, moving leaders."""
-    late, moving = certificate.proof.late, certificate.proof.leaders_move
+    late, leaders = certificate.proof.late, certificate.proof.asked_leaders
     virtual = late is not None and late.messages.vehicles is not None
     absent = {
         "virtual positions": virtual,
         "no limits": certificate.limits or (late is not None and late.messages.gain_cap is not None),
         without_flaws(None if late is None else late.messages): late is not None and not late.messages.exact,
-        "leaders at rest": moving,
+        "leaders at rest": leaders is not None and leaders.speed > 0,
+        "no disturbances": leaders is not None and leaders.disturbance > 0,
     }
     return ", ".join(text for text, there in absent.items() if there)
 
