@@ -118,8 +118,8 @@ class Asks:
         where messages are late or leaders move, in what is bounded of these.
     noise : number, optional
         Nominal protocol: bound of the measurement noise ``|n_k|``, ``u = -gain L (X + n)``, whose effect is bounded
-        under each limit of the gain but sampling. Noise times an infinite gain is bounded by nothing. Where messages are
-        late or leaders move it is an error of values of twice this.
+        under each limit of the gain but sampling. Noise times an infinite gain is bounded by nothing. Where messages
+        are late or leaders move it is an error of values of twice this.
     disturbance : Disturbance, str, number, callable or sequence, optional
         Sliding mode: what the simulated run meets; see :func:`ptcc_certify.simulation.run.simulate`.
     simulation : bool, optional
