@@ -1660,16 +1660,24 @@ def test_a_score_beside_nodes_with_numbers_is_no_target(tmp_path, row):
 
 
 @pytest.mark.parametrize(
-    ("name", "content"),
+    ("said", "name", "content"),
     [
-        ("g.csv", "source,target,weight,is_conflict\na,b,2,1\nb,a,1,0\n"),
-        ("g.csv", "source,target,weight,conflict\na,b,2,yes\nb,a,1,no\n"),
-        ("g.csv", "source,target,weight,cooperation\na,b,2,0\nb,a,1,1\n"),
-        ("g.json", '{"links": [{"source": 0, "target": 1, "weight": 2, "conflict": true}]}'),
+        ("are these signs", "g.csv", "source,target,weight,is_conflict\na,b,2,1\nb,a,1,0\n"),
+        ("are these signs", "g.csv", "source,target,weight,conflict\na,b,2,yes\nb,a,1,no\n"),
+        ("are these signs", "g.csv", "source,target,weight,cooperation\na,b,2,0\nb,a,1,1\n"),
+        ("are these signs", "g.json", '{"links": [{"source": 0, "target": 1, "weight": 2, "conflict": true}]}'),
+        ("codes of relations, not signs", "g.csv", "source,target,type\na,b,1.1\nb,a,2.3\n"),
+        (
+            "codes of relations, not signs",
+            "g.gml",
+            "graph [ directed 1 node [ id 0 ] node [ id 1 ] edge [ source 0 target 1 type 1.1 ] ]",
+        ),
+        ("codes of relations, not signs", "g.json", '{"links": [{"source": 0, "target": 1, "type": 0.5}]}'),
+        ("codes of relations, not signs", "g.sif", "a\t0.5\tb\n"),
     ],
 )
-def test_conflict_and_cooperation_beside_positive_weights_may_be_signs(tmp_path, name, content):
-    with pytest.raises(FormatError, match="are these signs"):
+def test_what_may_be_signs_or_codes_is_no_weight_in_silence(tmp_path, said, name, content):
+    with pytest.raises(FormatError, match=said):
         read_graph(put(tmp_path, name, content))
 
 
@@ -1681,20 +1689,6 @@ def test_a_number_that_nodes_write_in_two_ways_is_told_beside_names(tmp_path):
     bounds = "source,target,weight_min,weight_max\n1,1.0,1,2\n1.0,1.1,-1,0\n"
     assert "1 and 1.0 are two nodes" in read_family(io.StringIO(bounds)).notes
     assert "1 and 1.0 are two nodes" in ptcc.as_family([(1, "1.0", 1, 2), ("1.0", "1.1", -1, 0)]).notes
-
-
-@pytest.mark.parametrize(
-    ("name", "content"),
-    [
-        ("g.csv", "source,target,type\na,b,1.1\nb,a,2.3\n"),
-        ("g.gml", "graph [ directed 1 node [ id 0 ] node [ id 1 ] edge [ source 0 target 1 type 1.1 ] ]"),
-        ("g.json", '{"links": [{"source": 0, "target": 1, "type": 0.5}]}'),
-        ("g.sif", "a\t0.5\tb\n"),
-    ],
-)
-def test_fractions_under_a_title_of_relations_are_no_weights_in_silence(tmp_path, name, content):
-    with pytest.raises(FormatError, match="codes of relations, not signs"):
-        read_graph(put(tmp_path, name, content))
 
 
 @pytest.mark.parametrize("content", ["source,target,type\na,b,1.1\nb,a,-2\n", "source,target,mor\na,b,1.1\nb,a,2\n"])
