@@ -200,13 +200,13 @@ def at_deadline(proof: GraphProof | FamilyProof, answer: Answer) -> Answer:
     late = proof.late
     if late is not None and late.tracks and late.largest and answer.status == MET:
         why = "nothing is proved of that" if math.isinf(late.largest) else "nothing settles under a cap"
-        return Answer(OPEN, f"{answer.what} at T while leaders move", why)
+        return Answer(OPEN, f"{answer.what} at T {_moved(proof.leaders_move)}", why)
     if proof.asked_messages is None or answer.status != MET or proof.constant:
         return answer
     what = f"{answer.what} at T with {proof.asked_messages.name}"
     if late is None:
         return Answer(OPEN, what, "nothing is proved of them")
-    rest = isinstance(proof, GraphProof) and proof.at_rest and not proof.leaders_move
+    rest = isinstance(proof, GraphProof) and proof.at_rest and proof.asked_leaders is None
     if not late.largest or (rest and not late.messages.value_error and late.vehicles is None):
         return answer
     if late.missed is not None:
@@ -230,8 +230,8 @@ def judge_rate_beside(proof: GraphProof | FamilyProof, least: Fraction, what: st
     late = proof.late
     if proof.constant or proof.agents is not None:
         return None
-    if proof.leaders_move:
-        return Answer(OPEN, what, "no rate is proved while leaders move")
+    if proof.asked_leaders is not None:
+        return Answer(OPEN, what, f"no rate is proved {_moved(proof.leaders_move)}")
     if any(limits.sample_period is not None for limits in proof.limits):
         return Answer(OPEN, what, "no rate is proved of a gain that is held")
     if proof.asked_messages is None or (late is not None and late.direct):
@@ -242,6 +242,10 @@ def judge_rate_beside(proof: GraphProof | FamilyProof, least: Fraction, what: st
         return Answer(OPEN, what, f"no rate is proved {whose}")
     rate = 2 * late.lmi.b
     return Answer(MET if rate >= least else OPEN, what, f"with {late.messages.name} {down(rate)} is proved")
+
+
+def _moved(leaders_move: bool) -> str:
+    return "while leaders move" if leaders_move else "under disturbances"
 
 
 def judge_messages(proof: GraphProof | FamilyProof) -> list[Answer]:
@@ -255,14 +259,21 @@ def judge_messages(proof: GraphProof | FamilyProof) -> list[Answer]:
             answers.append(Answer(OPEN, "max_residual", "no messages are late"))
         return answers
     if not late.says_something and late.tracks:
-        return [Answer(OPEN, "leaders that move", "no vector for their followers was found")]
+        told = Answer(OPEN, "leaders that move", "no vector for their followers was found")
+        return [told, *_nothing_left(most)]
     if not late.says_something:
         limited = 0 < (late.longest_delay or 0) < math.inf
         limit = f"; this certificate's limit is a delay of {late.longest_delay:.3g}" if limited else ""
         wish = "" if most is None else _longest(late, f"within {near(most, 12)} at T is ")
         mend = "; give an initial state" if proof.initial_state is None else ""
-        return [Answer(OPEN, late.messages.name, f"nothing is proved of what is left at T{mend}{limit}{wish}")]
+        told = Answer(OPEN, late.messages.name, f"nothing is proved of what is left at T{mend}{limit}{wish}")
+        return [told, *_nothing_left(None if wish else most)]
     return [] if most is None else [_judge_residual(proof, late, most)]
+
+
+def _nothing_left(most: Fraction | None) -> list[Answer]:
+    """Leave open what may be left at ``T``, if that was asked."""
+    return [] if most is None else [Answer(OPEN, f"within {near(most, 12)} at T", "nothing is proved")]
 
 
 def _judge_residual(proof: GraphProof | FamilyProof, late: LateBounds, most: Fraction) -> Answer:
@@ -312,7 +323,7 @@ def _judge_late_input(proof: GraphProof | FamilyProof, late: LateBounds, most: F
     """Tell whether every input stays within so much with late messages."""
     largest = largest_late_input(late, proof.protocol)
     if largest is None:
-        why = f"no bound is proved {'while leaders move' if late.tracks else 'with late messages'}"
+        why = f"no bound is proved {_moved(proof.leaders_move) if late.tracks else f'with {late.messages.name}'}"
         if late.messages.vehicles is not None:
             why = "no bound is proved of virtual positions without a cap"
         elif late.heard_right and not late.tracks:

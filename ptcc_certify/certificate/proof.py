@@ -166,7 +166,7 @@ class Proof(OfQuestion):
     @property
     def leaders_move(self) -> bool:
         """Whether leaders move."""
-        return self.asked_leaders is not None
+        return self.asked_leaders is not None and self.asked_leaders.speed > 0
 
     @property
     def velocities(self) -> Sequence[Fraction] | None:

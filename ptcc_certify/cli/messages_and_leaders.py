@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ptcc_certify.cli.click_options import flag_of, given_of, names_of, options_for
 from ptcc_certify.cli.options import Options, graph_file
 from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.parameters import parameter
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
@@ -140,7 +141,11 @@ def noted_delays(notes: Iterable[str], title: str) -> tuple[str, ...]:
 
 def leaders_of(options: Options) -> MovingLeaders | None:
     """Return how leaders move; None if nothing is asked of that. ``--delta`` is what disturbs the followers."""
-    given = given_of(MovingLeaders, options)
-    if given and "speed" not in given:
-        raise ParameterError(f"{flag_of('sign_gain')} belongs to leaders that move; give {flag_of('leader_speed')}")
-    return MovingLeaders(**given, disturbance=options["delta"] or 0) if given else None
+    given: dict[str, Any] = {**given_of(MovingLeaders, options)}
+    if not given:
+        return None
+    delta = parameter("delta", options["delta"] or 0, True)
+    if "speed" not in given and not delta:
+        mend = f"give {flag_of('leader_speed')}, or {flag_of('delta')} where messages are late"
+        raise ParameterError(f"{flag_of('sign_gain')} belongs to leaders that move; {mend}")
+    return MovingLeaders(**{"speed": 0, **given}, disturbance=delta)

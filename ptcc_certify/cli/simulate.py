@@ -48,6 +48,7 @@ from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.case import Case
 from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.run import Run
 
 if TYPE_CHECKING:
@@ -212,6 +213,8 @@ def _run_beside(
     messages, leaders = messages_of((graph,), signed, options), leaders_of(options)
     if messages is None and leaders is None:
         return None
+    if leaders is None and protocol.reaching is None and options["delta"]:
+        leaders = MovingLeaders(speed=0, disturbance=options["delta"])
     source = click.get_current_context().get_parameter_source
     name = "late messages" if messages else "leaders that move"
     refused = ["steps", "boundary_layer", "noise", "stop_before", "sample_period"]

@@ -164,7 +164,7 @@ class Asks:
     delta: Any = None
     noise: Any = option(
         "--noise NU",
-        "Nominal: bound the effect of measurement noise |n_k| <= NU under a limit.",
+        "Nominal: measurement noise |n_k| <= NU, under a limit or with late messages.",
         key="disturbance.noise",
         example="0.01",
         unit="state",

@@ -120,12 +120,17 @@ class Case:
             return self
         if asks.delta is not None and (leaders is None or not leaders.disturbance):
             speed, sign = (0, None) if leaders is None else (leaders.speed, leaders.sign_gain)
-            leaders, asks = MovingLeaders(speed, asks.delta, sign), replace(asks, delta=None)
+            delta = parameter("delta", asks.delta, True)
+            leaders, asks = MovingLeaders(speed, delta, sign), replace(asks, delta=None)
+        if leaders is not None and not leaders.total and leaders.sign_gain is None:
+            leaders = None  # they rest, and nothing disturbs anybody
         caps = {entry.gain_cap for entry in self.limits}
         alone = all(entry.stop_before is None and entry.sample_period is None for entry in self.limits)
         limits = self.limits
-        if messages is None and len(caps) < 2 and alone:
+        if len(caps) < 2 and alone and leaders is not None and messages is None:
             messages, limits = AtOnce(gain_cap=next(iter(caps), None)), ()
+        elif len(caps) == 1 and alone and messages is not None and messages.gain_cap is None:
+            messages, limits = replace(messages, gain_cap=next(iter(caps))), ()
         if asks.noise is not None and messages is not None:
             error = messages.value_error + 2 * parameter("noise", asks.noise)
             told: dict[str, Any] = {part.name: getattr(messages, part.name) for part in fields(messages) if part.init}

@@ -174,12 +174,12 @@ lambda of L, or measure the own state without delay
 
     @property
     def flaws(self) -> tuple[str, ...]:
-        """What messages are, of "late" and "rounded"; empty where they are exact."""
-        return tuple(word for word, size in (("late", self.age), ("rounded", self.value_error)) if size)
+        """What messages are, of "late" and "inexact"; empty where they are neither."""
+        return tuple(word for word, size in (("late", self.age), ("inexact", self.value_error)) if size)
 
     @property
     def name(self) -> str:
-        """What they are called: late messages, rounded ones, or both."""
+        """What they are called: late messages, inexact ones, or both."""
         return f"{' and '.join(self.flaws) or 'late'} messages"
 
     def latencies(self, of: SignedDigraph | Family) -> Fraction | tuple[Fraction, ...]:

@@ -43,7 +43,7 @@ _NOT_LATE = {
     "sample_period": "of late messages a period tells how often they are sent; give that instead",
     "delta": "is given twice: MovingLeaders(disturbance=..) tells what disturbs the followers; leave one of them out",
 }
-_CAPPED = "followers of leaders that move are certified under one gain cap alone; leave it out"
+_CAPPED = "followers of leaders that move are certified under one gain cap alone; leave others out"
 #: What is not certified beside leaders that move.
 _NOT_TRACKING = {
     "initial_set": _NO_SET,
@@ -226,8 +226,9 @@ leave one of the two out
     if messages is None or leaders is None:
         return
     if messages.own_delay:
+        what = "of leaders at rest" if leaders.speed else "without disturbances"
         raise ParameterError(
-            "own_delay", "an own state that is late is certified of leaders at rest alone; leave one of the two out"
+            "own_delay", f"an own state that is late is certified {what} alone; leave one of the two out"
         )
 
 

@@ -68,7 +68,7 @@ def simulate_tracking(
     steps : int
         Up to ``T``, about.
     gain_cap : Fraction, optional
-        The gain is at most this.
+        The gain is at most this, 1/time/weight.
 
     Returns
     -------

@@ -56,7 +56,10 @@ class WorstLeaders:
         self.followers, self.heads = F, np.setdiff1d(np.arange(n), F)
         L = structure.graph.dense_laplacian()
         self.L_F = L[np.ix_(F, F)]
-        self.Q = -np.linalg.solve(self.L_F, L[np.ix_(F, self.heads)])
+        try:
+            self.Q = -np.linalg.solve(self.L_F, L[np.ix_(F, self.heads)])
+        except np.linalg.LinAlgError:
+            raise ParameterError("the weights lie too far apart for a run: floats lose who follows whom") from None
         self.speed, self.delta = float(leaders.speed), float(leaders.disturbance)
         try:
             self.weights = np.ones(F.size) if u is None else np.asarray(u, dtype=float)

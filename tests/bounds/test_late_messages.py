@@ -594,7 +594,7 @@ def test_what_makes_the_input_unbounded_is_told_as_it_was_asked() -> None:
         return " ".join(made.summary().split())
 
     assert "not proved bounded: not all who listen have rho2 kappa times their" in told("0.9", LateMessages("0.1"))
-    assert "not proved bounded with rounded messages: a gain" in told("1", LateMessages(value_error="0.1"))
+    assert "not proved bounded with inexact messages: a gain" in told("1", LateMessages(value_error="0.1"))
     assert "not proved bounded with late messages: a gain" in told("1", LateMessages("0.1", value_error="0.1"))
 
 

@@ -137,7 +137,7 @@ def test_no_delay_is_told_that_the_check_does_not_accept(monkeypatch: pytest.Mon
         ),
         (
             ("--quantisation", "0.1"),
-            "left open: bipartite consensus at T with rounded messages (nobody is proved to settle at T)",
+            "left open: bipartite consensus at T with inexact messages (nobody is proved to settle at T)",
         ),
         (
             ("--delay", "0.005", "--max-input", "1e6"),
@@ -264,7 +264,7 @@ def test_agents_that_begin_on_their_targets_are_not_said_to_get_little_nearer(wo
         ),
         (
             ("team.csv", "--leader-speed", "1", "--stop-before", "0.1"),
-            "certified under one gain cap alone; leave it out",
+            "under one gain cap alone; leave others out",
         ),
         (("team.csv", "--uncertainty", "1%", "--delay", "none"), 'no column "none"; add it, or name one of source'),
         (("team.csv", "--uncertainty", "1%", "--delta", "1"), "--delta is for one graph, not for families yet"),
@@ -544,7 +544,6 @@ def test_simulate_draws_such_runs_and_takes_them_from_a_scenario(words: tuple[st
         (("--delay", "0.1", "--steps", "9"), "--steps: is not simulated with late messages"),
         (("--delay", "0.1", "--samples", "9"), "--samples: is not simulated with late messages"),
         (("--delay", "0.1", "--leader-speed", "1", "--sign-gain", "2"), "--sign-gain is not simulated where messages"),
-        (("--delay", "0.1", "--delta", "1"), "--delta: is not simulated with late messages"),
         (("--leader-speed", "1", "--stop-before", "0.1"), "--stop-before: is not simulated with leaders that move"),
         (("--delay", "0.1", "--agents", "double-integrator"), "--delay: is not simulated of agents of order n"),
         (("--delay", "0.1", "--uncertainty", "10%"), "--delay: is not simulated of families of graphs"),
@@ -654,7 +653,8 @@ def test_families_and_other_limits_are_refused_in_python_too() -> None:
     with pytest.raises(ParameterError, match="max_residual is asked of late messages; tell how late"):
         certify(pair, protocol, uncertainty="10%", asks=Asks(expectations=Expectations(max_residual=1)))
     with pytest.raises(ParameterError, match="gain_cap: limits and late messages have two"):
-        certify(pair, protocol, messages=each, limits=same)
+        certify(pair, protocol, messages=LateMessages("0.1", gain_cap=9), limits=same)
+    assert certify(pair, protocol, messages=each, limits=same).late.messages.gain_cap == 20
     with pytest.raises(ParameterError, match=r"delta is given twice: MovingLeaders\(disturbance=..\)"):
         certify(pair, protocol, leaders=MovingLeaders(speed=1, disturbance=1), asks=Asks(delta=1))
 
@@ -871,7 +871,7 @@ def test_under_a_cap_leaders_that_move_are_nearly_tracked_and_no_behaviour_is_me
     asked = (*QUICK, *START, "--leader-speed", "0.5")
     run = ptcc("certify", "team.csv", *asked, "--gain-cap", "20", "--expect", "bipartite-containment", "-o", "c.json")
     text = " ".join(run.out.split())
-    assert run.code == 4 and "nothing settles under a cap" in text and "under a cap nothing settles: gain <= 20" in text
+    assert run.code == 4 and "nothing settles under a cap" in text and "gain <= 20: under a cap nothing settles" in text
     assert ptcc("check", "c.json").code == 0
     late, free = read_certificate("c.json").late, certify("team.csv", NominalProtocol(), leaders=MovingLeaders("0.5"))
     assert late is not None and late.tracks and 0 < late.largest < 0.3 and free.late.largest == 0
@@ -914,3 +914,29 @@ def test_disturbances_and_noise_go_with_late_messages_and_leaders_that_move(word
     page = Path("c.html").read_text(encoding="utf-8")
     assert ("leaders at rest" in page) == ("--leader-speed" in words)
     assert ("without disturbances" in page) == ("--delta" in words)
+
+
+@pytest.mark.parametrize("more", [("--leader-speed", "1"), ("--delay", "0.01", "--delta", "1")])
+def test_followers_that_begin_on_their_targets_still_add_their_sign_term(more: tuple[str, ...]) -> None:
+    Path("r.csv").write_text("l,a,1\na,b,1\nb,a,1\n")
+    asked = ("r.csv", "--rho2", "0.7", "--x0", "1,1,1", "--sign-gain", "2", "--max-input", "0.5", *QUICK[4:])
+    run = ptcc("certify", *asked, *more)
+    assert run.code == 4 and "left open: |u_k| <= 0.5" in " ".join(run.out.split()), run
+
+
+def test_of_weights_too_far_apart_for_floats_a_page_is_written_and_no_run_is_made() -> None:
+    Path("ill.csv").write_text("l,a,1e-30\na,b,1e9\nb,a,1e9\n")
+    asked = ("ill.csv", "--x0", "1,3,-4", "--leader-speed", "1")
+    run = ptcc("certify", *asked, *QUICK[4:], "--max-residual", "1", "-o", "i.json")
+    assert run.code == 4 and "within 1 at T (nothing is proved)" in " ".join(run.out.split())
+    assert ptcc("report", "i.json", "-o", "i.html").code == 4 and Path("i.html").exists()
+    refused = ptcc("simulate", *asked, "-o", "i.csv")
+    assert refused.code == 2 and "too far apart for a run" in refused.err
+
+
+def test_leaders_of_speed_0_are_told_to_rest() -> None:
+    plain, still = (ptcc("certify", "team.csv", *START, *QUICK, *more) for more in ((), ("--leader-speed", "0")))
+    assert still.out == plain.out
+    disturbed = ptcc("certify", "team.csv", *START, *QUICK, "--delta", "1", "--delay", "0.01", "--gain-cap", "20")
+    assert "at rest; any |d_k| <= 1" in disturbed.out and "leaders move" not in disturbed.out
+    assert ptcc("simulate", "team.csv", *START, "--delta", "1", "--delay", "0.01", "-o", "r.csv").code == 0

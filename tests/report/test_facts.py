@@ -191,8 +191,8 @@ def test_messages_that_are_rounded_are_not_called_late():
         ptcc.Asks(simulation=False),
     )
     messages = {
-        "nothing late or rounded": ptcc.LateMessages("0.001", value_error="0.1"),
-        "nothing rounded": ptcc.LateMessages(value_error="0.1"),
+        "nothing late or inexact": ptcc.LateMessages("0.001", value_error="0.1"),
+        "nothing inexact": ptcc.LateMessages(value_error="0.1"),
     }
     for without, of in messages.items():
         rounded = ptcc.certify(led, law, [1, 2, 3], messages=of, asks=asks)

@@ -576,7 +576,7 @@ def test_the_run_that_is_drawn_is_the_one_that_was_asked(title: str) -> None:
     assert sorted(ends) == pytest.approx(sorted(run.states[:, -1]), abs=1e-6)
     bounds = [line.get_label() for line in drawn_axes[1].lines if "bound" in str(line.get_label())]
     assert all(
-        str(label).endswith(("nothing late", "nothing rounded", "leaders at rest", "no limits")) for label in bounds
+        str(label).endswith(("nothing late", "nothing inexact", "leaders at rest", "no limits")) for label in bounds
     )
 
 

@@ -217,9 +217,9 @@ class LateBounds:
 
     @property
     def heard_right(self) -> bool:
-        """Whether followers hear what is so, however late: nobody moves, or they hear of leaders at rest alone."""
+        """Whether followers hear what is so, and no sign term acts: nobody moves, or all hear leaders at rest alone."""
         bounds = [row.initial + row.highest_floor(self.case) for row in self.rows]
-        return self.vehicles is None and (self.direct or not all(bounds or [True]))
+        return self.vehicles is None and not self.case.signed and (self.direct or not all(bounds or [True]))
 
     @cached_property
     def _inputs_heard_right(self) -> np.ndarray | None:

@@ -54,7 +54,7 @@ def asked_messages(certificate: Certificate) -> LateMessages | None:
 
 
 def without_flaws(messages: LateMessages | None) -> str:
-    """Tell that nothing is late, or rounded, of what was asked."""
+    """Tell that nothing is late, or inexact, of what was asked."""
     return f"nothing {' or '.join(messages.flaws if messages is not None else ())}"
 
 

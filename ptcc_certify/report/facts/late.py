@@ -68,7 +68,7 @@ def _unbounded_text(late: LateBounds) -> str:
         return "not proved bounded yet of virtual positions without a cap of the gain"
     if late.heard_right:
         return "not proved bounded: not all who listen have rho2 kappa times their weights >= 1"
-    kind = "late" if late.messages.age else "rounded"
+    kind = "late" if late.messages.age else "inexact"
     why = "" if late.messages.gain_cap is not None else f": a gain without a cap makes ever more of what is {kind}"
     return f"not proved bounded with {kind} messages{why}"
 
@@ -107,7 +107,7 @@ def _tracking(late: LateBounds, leaders: MovingLeaders, at: Fraction | None) -> 
         return
     protocol, after = late.case.protocol, late.after or 0.0
     if (cap := late.messages.gain_cap) is not None:
-        yield Fact(head="tracking", note=f"under a cap nothing settles: gain <= {near(cap)}")
+        yield Fact(head="tracking", note=f"gain <= {near(cap)}: under a cap nothing settles")
     where = f"within {up(late.largest, 2)} of its" if late.largest else "on its"
     then = f"within {up(after, 2)} of it from then on" if after else "and ever after"
     text = f"every follower {where} target at T = {near(protocol.T)}, {then}"
@@ -117,14 +117,18 @@ def _tracking(late: LateBounds, leaders: MovingLeaders, at: Fraction | None) -> 
         instants = {f"t = {near(at)}": at}
     whole = FROM_WITHIN_1.removeprefix(",") if late.relative else ""
     bounds = late.largest_bound([float(t) for t in instants.values()]).tolist()
-    within = ", ".join(f"{up(x, 2)} of it at {when}" for when, x in zip(instants, bounds, strict=True))
+    within = ", ".join(f"{_bound_text(late, x, 2)} of it at {when}" for when, x in zip(instants, bounds, strict=True))
     yield Fact(head="tracking", note=f"before T within {within}{whole}")
     if late.inputs is not None:
         largest = float(late.inputs.max())
-        yield Fact(head="input", value=largest, side="up", note=f"bounded up to T; |u_k| <= {up(largest, 4)}{whole}")
+        text = f"bounded up to T; |u_k| <= {up(largest, 4) if largest else 0}{whole}"
+        yield Fact(head="input", value=largest, side="up", note=text)
     else:
-        note = ("not proved bounded while leaders move; ", Change("rho2", late.bounding_rho2), " bounds it")
+        moving = "while leaders move" if leaders.speed else "under disturbances"
+        note = (f"not proved bounded {moving}; ", Change("rho2", late.bounding_rho2), " bounds it")
         yield Fact(head="input", standing="unproved", note=note, loud=True)
+    if late.largest and (by_agent := _residual_text(late)):
+        yield Fact(head="left", note=f"at T by agent: {by_agent}", detail=True)
 
 
 def leaders_text(leaders: MovingLeaders) -> str:

@@ -25,12 +25,13 @@ def beside_law(certificate: Certificate) -> list[str]:
                 f"Here nothing is late; with late messages what is heard, {whose}, is up to {near(messages.age)} old."
             )
         if messages.value_error > 0:
-            off = f"with rounded ones what is heard is off by up to {near(messages.value_error)}"
+            off = f"with inexact ones what is heard is off by up to {near(messages.value_error)}"
             told.append(f"Here messages are exact; {off}.")
         if messages.gain_cap is not None and messages.vehicles is None and not limits:
             limits = [Limits(gain_cap=messages.gain_cap)]
     if leaders is not None:
-        told.append(f"Here leaders are at rest; of those that move was asked: {leaders_text(leaders)}.")
+        what = "leaders are at rest; of those that move was asked" if leaders.speed else "nothing disturbs; asked was"
+        told.append(f"Here {what}: {leaders_text(leaders)}.")
     if certificate.noise is not None:
         told.append(f"With noise e_k is that of x + n, any |n_k| <= {near(certificate.noise)}.")
     if limits:

@@ -115,6 +115,8 @@ def _runs(certificate: Certificate, late: LateBounds, start: list[float]) -> lis
         run = simulate_tracking(graph, protocol, late.leaders, start, u=u, steps=400, gain_cap=cap)
         return [(run, {"color": RUN, "linewidth": 1.1, "label": "worst leaders"})]
     drawn = _RUNS if can_run(protocol, late.messages) and not late.case.signed else {}
+    if not late.messages.age:
+        drawn = {"oldest": {**_RUNS["oldest"], "label": "values as far off as allowed"}} if drawn else {}
     more = {"leaders": late.leaders}
     return [
         (simulate_late(graph, protocol, late.messages, start, pattern=pattern, **more), style)  # type: ignore[arg-type]
