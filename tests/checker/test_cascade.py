@@ -16,11 +16,10 @@ import numpy as np
 import pytest
 from asked import certify_family, certify_words
 from generators import all_classes, random_graph
-from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
 from mutations import Json, changed, judged_mutants, mutants, nudged, resealed
 from oracle_cascade import false_claims_of_cascade
+from schema_validator import VALIDATOR
 
-from ptcc_certify.certificate.json_schema import json_schema
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
@@ -29,7 +28,6 @@ from ptcc_certify.model.agents import Agents
 
 F = Fraction
 CLASSES = dict(all_classes())
-VALIDATOR = Draft202012Validator(json_schema())
 CAMPS = [("a", "b", 1), ("b", "c", -2), ("c", "a", "-1/2"), ("c", "f", -1), ("a", "f", 2)]
 ENEMIES = [("a", "b", -1), ("b", "c", -2), ("c", "a", -1), ("b", "a", -1)]
 SINGLES = [("a", "f", 1), ("b", "f", -2), ("f", "g", 1)]
