@@ -124,14 +124,15 @@ def rejecting(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     return tmp_path
 
 
+QUICK = ["chain.csv", "--method", "paper"]
 COMMANDS = {
-    "behaviour": ["chain.csv", "--expect", "stability"],
-    "rate": ["chain.csv", "--min-rate", "1000"],
-    "input": ["chain.csv", "--max-input", "0.001"],
-    "met": ["chain.csv", "--expect", "bipartite-consensus", "--min-rate", "0.001"],
-    "late": ["chain.csv", "--delay", "0.01", "--max-residual", "1e-9"],
-    "leaders": ["chain.csv", "--leader-speed", "1", "--max-input", "1e-3"],
-    "agents": ["chain.csv", "--agents", "2", "--max-input", "1e-3", "--expect", "stability"],
+    "behaviour": [*QUICK, "--expect", "stability"],
+    "rate": [*QUICK, "--min-rate", "1000"],
+    "input": [*QUICK, "--max-input", "0.001"],
+    "met": [*QUICK, "--expect", "bipartite-consensus", "--min-rate", "0.001"],
+    "late": [*QUICK, "--delay", "0.01", "--max-residual", "1e-9"],
+    "leaders": [*QUICK, "--leader-speed", "1", "--max-input", "1e-3"],
+    "agents": [*QUICK, "--agents", "2", "--max-input", "1e-3", "--expect", "stability"],
     "family": ["chain.csv", "other.csv", "--switching", "--expect", "stability", "--min-rate", "1000"],
 }
 
