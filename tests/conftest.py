@@ -42,6 +42,14 @@ def real_data() -> Path:
     return folder
 
 
+@pytest.fixture
+def framed_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages and statements with empty frames for figures, for tests of their words: letters of figures are paths."""
+    frames = {".svg": b'<svg viewBox="0 0 1 1"></svg>', ".pdf": b"%PDF"}
+    for module in ("page_figures", "report_file"):
+        monkeypatch.setattr(f"ptcc_certify.report.{module}.figure_bytes", lambda _, suffix: frames[suffix])
+
+
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Any]:
     """Chromium, driven by playwright, for what only a browser can tell of a page."""

@@ -21,6 +21,8 @@ from ptcc_certify.report.facts.law import beside_law
 from ptcc_certify.report.page import set_note
 from ptcc_certify.report.screen import certificate_lines, summary_lines
 
+pytestmark = pytest.mark.usefixtures("framed_figures")
+
 CORPUS = Path(__file__).parents[1] / "corpus"
 NAMES = thinned(sorted(path.stem for path in CORPUS.glob("*.json")), 24)
 WEAK = ptcc.NominalProtocol(T=1, rho1=1, rho2="0.1", kappa=1)
