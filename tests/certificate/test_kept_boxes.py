@@ -81,6 +81,7 @@ def reached(family: Family, x: list[Fraction], rng: random.Random) -> tuple[np.n
     return low, high
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("seed", thinned(range(12), 3))
 def test_every_signal_keeps_agents_within_the_ends_of_all_walks(seed: int):
     rng = random.Random(seed)

@@ -185,6 +185,7 @@ def float_ball(x: Fraction) -> flint.arb:
 LITTLE = ptcc.Asks(expectations=Expectations(max_residual=Fraction(1, 1000)))
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("options", "says"),
     [

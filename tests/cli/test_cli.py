@@ -101,6 +101,7 @@ def test_the_names_of_the_table_differ():
 SAMPLE = ("weight NaN", "XML entity bomb", "T NaN", "unknown command")
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("case", [c for c in BAD_INPUTS if c.name in SAMPLE], ids=lambda case: case.name)
 def test_bad_input_to_a_process_of_its_own(case: BadInput, folder: Path):
     write(case.files, folder)
@@ -510,6 +511,7 @@ def odd_graphs() -> dict[str, str]:
     }
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("command", ["classify", "certify"])
 @pytest.mark.parametrize("name", [*GRAPHS, "apart", "one", "isolated"])
 def test_json_is_exactly_one_object(command: str, name: str):

@@ -65,6 +65,7 @@ def test_the_decision_of_any_family_fits_the_screen(kind: str):
             assert len(components) > 1 or sum(line.startswith("claim") for line in told) == 1
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_certificate_of_any_family_fits_the_screen(kind: str):
     rng = random.Random(10 + KINDS.index(kind))
