@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 from fractions import Fraction
+from functools import cache
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -502,6 +503,7 @@ MOVING: dict[str, float | str] = {
 EDGES = [("a", "b", 1), ("b", "a", -1), ("b", "c", -2), ("c", "d", 1)]
 
 
+@cache
 def moving_document(**gains: float | str) -> dict[str, Any]:
     """A certificate under the sliding-mode protocol whose sliding variables move."""
     protocol = SlidingModeProtocol(**{**MOVING, **gains})
