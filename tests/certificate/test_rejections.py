@@ -48,6 +48,7 @@ CHAIN = "source,target,weight\na,b,1\nb,c,-1\n"
 # ---------------------------------------------------------------------- what the file states
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("seed", thinned([0, 2, 3, 4, 5], 3))
 def test_who_misses_the_deadline_is_proved_of_final_states_that_are_enclosed(seed: int):
     """Above 120 agents the file states decimals, which are not the floats that were computed."""

@@ -573,6 +573,7 @@ def made_by_the_program(seed: int, method: str) -> Json:
     return json.loads(certify_words(case.graph, case.protocol, case.x0, **options).to_json())
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("seed", [3, 13])
 def test_what_the_program_makes_is_true(seed: int):
     data = made_by_the_program(seed, "paper")

@@ -152,7 +152,7 @@ def test_what_follows_is_accepted_with_and_without_arrays_and_has_the_shape_of_t
         assert report.obligations == reports[0].obligations
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", thinned(NAMES, 3))
 def test_motions_keep_to_what_is_accepted(name: str):
     assert late_claims(samples()[name]) == []

@@ -183,6 +183,7 @@ def test_a_sliding_variable_that_starts_at_zero_is_there_from_the_beginning():
         assert one.z > 0
 
 
+@pytest.mark.few(5)
 @pytest.mark.parametrize("power", thinned([F(1, 100), F(1, 3), F(1, 2), F(9, 10), F(999, 1000)], 2))
 @pytest.mark.parametrize("mu2", [F(1, 1000), F(1), F(30)])
 def test_below_one_the_finite_limit_of_the_integral_divides_proved_from_only_the_deadline(power, mu2):
@@ -198,6 +199,7 @@ def test_below_one_the_finite_limit_of_the_integral_divides_proved_from_only_the
     assert ball(p.mu1 - p.delta) * inverse_decay_integral(p, below.z) >= ball(size * (1 - F(1, 10**9)))
 
 
+@pytest.mark.few(20)
 @pytest.mark.parametrize("power", [F(1), 1 + F(1, 10**9), F(3, 2), F(9, 5), F(2), F(5), F(100)])
 @pytest.mark.parametrize("size", [10**6, 10**12, 10**30])
 @pytest.mark.parametrize("gap", [F(1), F(1, 10**12)])
