@@ -180,6 +180,7 @@ def test_boxes_have_an_order_and_obligations_of_their_own():
     assert check(resealed(older)).accepted
 
 
+@pytest.mark.usefixtures("framed_figures")
 def test_screen_page_statement_and_table_tell_them():
     certificate = made(MOVED, X0)
     saved = read_certificate(certificate.to_dict())
