@@ -44,7 +44,7 @@ PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 TRIANGLE = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1), (3, 1, 2)])
 #: Small graphs of all classes, which take about a tenth of a second each, and tiny ones, which take less.
 SPEC = "count = 8\nseed = 5\nnodes = { from = 5, to = 6 }\n"
-TINY = 'count = 8\nseed = 5\nnodes = 3\nconnectivity = "strong"\nbalanced = true\n'
+TINY = 'count = 8\nseed = 5\nnodes = 3\nconnectivity = "strong"\nbalanced = false\n'
 QUICK = ("--method", "perron", "--workers", "1")
 
 
