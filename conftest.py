@@ -57,10 +57,14 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def _left_out(items: list[pytest.Item]) -> set[pytest.Item]:
-    """Return of every test that is marked ``few(count)`` all cases but so many, spread from the first on."""
+    """Return of every test that is marked ``few(count)`` all cases but so many, spread from the first on.
+
+    Cases of campaigns are none of these: where they are selected, all of them run.
+    """
     tests: dict[str, list[pytest.Item]] = {}
     for item in items:
-        tests.setdefault(item.nodeid.partition("[")[0], []).append(item)
+        if item.get_closest_marker("campaign") is None:
+            tests.setdefault(item.nodeid.partition("[")[0], []).append(item)
     rest: set[pytest.Item] = set()
     for cases in tests.values():
         if (mark := cases[0].get_closest_marker("few")) is not None:

@@ -20,7 +20,7 @@ from hypothesis import settings
 # A shell lets what it runs in the background ignore Ctrl-C; tests send it to themselves and to their children.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=40)
+settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=25)
 #: ``--hypothesis-profile thorough``: other examples every time, and many.
 settings.register_profile("thorough", deadline=None, max_examples=1000)
 settings.load_profile("repeatable")
@@ -40,6 +40,14 @@ def real_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no real graphs: {folder} does not exist; set PTCC_REAL_DATA to their folder")
     return folder
+
+
+@pytest.fixture
+def framed_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages and statements with empty frames for figures, for tests of their words: letters of figures are paths."""
+    frames = {".svg": b'<svg viewBox="0 0 1 1"></svg>', ".pdf": b"%PDF"}
+    for module in ("page_figures", "report_file"):
+        monkeypatch.setattr(f"ptcc_certify.report.{module}.figure_bytes", lambda _, suffix: frames[suffix])
 
 
 @pytest.fixture(scope="session")

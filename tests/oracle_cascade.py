@@ -236,13 +236,15 @@ def halved(laplacian: Any, states: Any, numbers: tuple[Fraction, ...], count: in
     found = []
     for _ in range(count):
         q, h, c = rho1 * w / 2, rho1 * w + k, [0 * x, 0 * x, x, v * (w / 2)]
-        while len(c) < 12 or max(map(size, c[-8:])) > max(map(size, c)) / 2**SMALL:
+        sizes = [size(each) for each in c]
+        while len(c) < 12 or max(sizes[-8:]) > max(sizes) / 2**SMALL:
             m = len(c) - 4
             assert m < 10_000, "a series that does not end"
             fast = c[-1] * (2 * h * (m + 1)) - c[-2] * ((h + 2 * q) * m) + c[-3] * (q * (m - 1))
             drawn = c[-2] * (k + alpha * h**2) - c[-3] * (2 * alpha * h * q) + c[-4] * (alpha * q**2)
             own = c[-1] * (4 * m * (m + 1)) - c[-2] * (m * (m - 1))
             c.append((own - L * (drawn + fast) - fast * alpha) * (1 / flint.arb(4 * (m + 1) * (m + 2))))
+            sizes.append(size(c[-1]))
         x, v = sum(c, 0 * x), sum((m * each for m, each in enumerate(c[2:])), 0 * x) * (2 / w)
         x, v, w = x.mid(), v.mid(), w / 2  # their radii would grow by many digits in every step
         found.append((x, v))

@@ -41,6 +41,7 @@ def small_delays(cert: Certificate, probe: LateMessages) -> SmallDelayBounds:
     return SmallDelayBounds(LateCase(cert.structure, PROTOCOL, probe, *known))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("own", [False, True])
 def test_delays_of_a_whole_graph_are_certified_that_are_five_times_as_long_as_those_of_its_functions(own: bool) -> None:
     probe = LateMessages("0.001", own_delay=own, gain_cap=CAP)
@@ -84,7 +85,7 @@ def test_the_longest_delay_for_a_wanted_residual_is_sought_by_it_too() -> None:
     assert longest.largest <= 1
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 @pytest.mark.parametrize("seed", range(8))
 def test_no_delay_is_forgiven_at_which_a_constant_gain_diverges(seed: int) -> None:
     graph, _ = grouped_graph(np.random.default_rng(seed), 1 + seed % 3)

@@ -70,6 +70,7 @@ def largest_at_start(cert: Certificate) -> Fraction:
 # ---------------------------------------------------------------------- bounds
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize(("name", "kwargs"), thinned(all_classes()[::4], 3))
 def test_no_deviation_bound_exceeds_the_largest_deviation_at_the_start(name: str, kwargs: dict, tmp_path: Path):
     rng = np.random.default_rng(5)

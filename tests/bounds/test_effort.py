@@ -193,6 +193,7 @@ def judge(graph: SignedDigraph, seed: int, overs: Sequence[Fraction] = OVER) -> 
     return ratios
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(("name", "kwargs"), class_cases(KINDS[::6]))
 def test_no_input_of_any_class_is_above_its_bounds(name: str, kwargs: dict):
     number = list(CLASSES).index(name)
@@ -203,6 +204,7 @@ def test_no_input_of_any_class_is_above_its_bounds(name: str, kwargs: dict):
 PACKAGED = [(name, over) for k, name in enumerate(GRAPHS) for over in OVER[k % 4 :: 3]]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("name", "over"), thinned(PACKAGED, 3))
 def test_no_input_on_a_packaged_graph_is_above_its_bounds(name: str, over: Fraction):
     judge(load_graph(name), 6, [over])
@@ -249,7 +251,7 @@ POWERS = (F(1, 2), F(1), F(5, 2))
 SLIDING = ("1.1", "1.2", "2.1 K=1", "2.2", "3.1 mixed", "3.2", "disconnected mixed")
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("name", "power"), thinned([(name, power) for name in SLIDING for power in POWERS], 8))
 def test_no_input_of_the_sliding_mode_is_above_its_bounds(name: str, power: Fraction):
     rng = np.random.default_rng(len(name))
@@ -301,6 +303,7 @@ def test_no_input_of_the_sliding_mode_is_above_its_bounds(name: str, power: Frac
 # ---------------------------------------------------------------------- the energy by Lyapunov equations
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     "name", thinned(["1.2", "1.1", "2.2", "3.1 mixed", "2.1 K>=2", "3.1 all single", "disconnected mixed"])
 )
@@ -522,6 +525,7 @@ def judge_limits(graph: SignedDigraph, seed: int) -> list[tuple[str, float]]:
 LIMITED = [name for name, kwargs in CLASSES.items() if smallest(**kwargs) <= 8 and not kwargs.get("isolated")]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("seed", thinned(range(0, 8, 2), 3))
 def test_limited_gains_leave_no_more_than_certified(seed: int):
     """Ten runs each, less what sampling too slow leaves uncertified."""
@@ -545,6 +549,7 @@ def test_limited_gains_leave_no_more_than_certified_on_hundreds_of_runs():
 # ---------------------------------------------------------------------- disturbances of the nominal protocol
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", thinned(["1.2", "1.1", "3.1 mixed", "2.1 K>=2", "disconnected mixed"]))
 def test_disturbances_add_no_more_than_certified(name: str):
     rng = np.random.default_rng(3 + len(name))
@@ -754,6 +759,7 @@ def test_odd_sets_limits_and_disturbances_are_refused(given: dict[str, Any]):
         certify_words(RING, NominalProtocol(1, 1, 1, 2), N3, simulation=False, **given)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("number", thinned(EXAMPLES))
 def test_every_example_has_its_effort(number: int):
     example = EXAMPLES[number]

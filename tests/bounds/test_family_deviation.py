@@ -50,6 +50,7 @@ def near(weight: int, of: str = "1/5") -> tuple[Fraction, Fraction]:
     return low, high
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("n", [4, 8])
 def test_agents_in_camps_are_no_farther_from_their_value_than_from_each_other(n: int):
     edges = [(k, (k + 1) % n, *near(-1 if k % 2 else 1)) for k in range(n)]

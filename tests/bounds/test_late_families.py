@@ -357,6 +357,7 @@ def test_rows_hold_at_the_worst_weights_of_every_mode_alone():
     assert json.loads(both.to_json())["messages"]["leaders"]["speed"] == "1"
 
 
+@pytest.mark.usefixtures("framed_figures")
 def test_figures_are_of_what_is_asked(tmp_path: Path):
     """The bound is drawn, and no run in which nothing is late and leaders rest."""
     late, moving = certified("late"), certified("leaders that move")
@@ -371,6 +372,7 @@ def test_figures_are_of_what_is_asked(tmp_path: Path):
     assert 'id="figure-late"' in page and 'id="figure-states"' not in page
 
 
+@pytest.mark.usefixtures("framed_figures")
 @pytest.mark.parametrize("name", ["late", "late behind leaders that move", "leaders that move"])
 def test_page_and_latex_tell_no_end_of_another_problem(name: str, tmp_path: Path):
     """Where agents end is told with what it leaves out, and a bound without a run is not called a run."""

@@ -40,13 +40,13 @@ SLIDING = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=
 
 
 def made(graph: Any, protocol: Any, x0: Any, agents: Agents, **options: Any) -> Certificate:
-    return certify_words(graph, protocol, x0, agents=agents, method="perron", **options)
+    return certify_words(graph, protocol, x0, agents=agents, **{"method": "perron", "simulation": False, **options})
 
 
 def seen(seed: int, order: int | None = None) -> tuple[Certificate, Any]:
     """The certificate of a random case, and its run against the bounds."""
     case = agent_case(seed, order)
-    certificate = made(case.graph, case.protocol, case.x0, case.agents, derivatives=case.derivatives)
+    certificate = made(case.graph, case.protocol, case.x0, case.agents, derivatives=case.derivatives, simulation=None)
     return certificate, certificate.agents_comparison
 
 
@@ -182,9 +182,10 @@ def test_single_integrators_in_a_formation_have_the_plain_certificate_of_their_p
     if name == "moving leaders":
         graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1), ("c", "d", 1), ("d", "b", "0.5")])
     x0, h = [5, 2, 4, -1], [1, -3, "2/3", 2]
-    ours = certify_words(graph, protocol, x0, simulation=False, agents=Agents(order=1, offsets=h), **beside)
+    asked = {"simulation": False, "method": "paper", **beside}
+    ours = certify_words(graph, protocol, x0, agents=Agents(order=1, offsets=h), **asked)
     less = [x - Fraction(y) for x, y in zip(x0, h, strict=True)]
-    plain = certify_words(graph, protocol, less, simulation=False, **beside)
+    plain = certify_words(graph, protocol, less, **asked)
     assert ours.verdict == "certified" and ours.agents is None and ours.offsets == tuple(map(Fraction, h))
     own, other = (
         {key: part for key, part in one.to_dict().items() if key not in ("digest", "unverified", "formation")}
@@ -517,7 +518,7 @@ def test_the_input_at_rest_is_bounded_iff_the_common_velocity_falls_fast_enough(
     assert f"INPUT NOT CERTIFIED BOUNDED: {why}" in told(certificate) and mend in certificate.assessment.text
     words = mend.replace("=", " ").split()
     mended = Agents(order=2, **{**agents, **{name: words[words.index(name) + 1] for name in agents if name in words}})
-    certificate = made(TEAM, NOMINAL, [5, 2, 4, -1], mended, v0=[1, 0, 0, -2])
+    certificate = made(TEAM, NOMINAL, [5, 2, 4, -1], mended, v0=[1, 0, 0, -2], simulation=None)
     assert certificate.agents is not None and certificate.agents.input is not None
     assert check(certificate.to_dict()).accepted and certificate.agents_comparison.worst <= 1 + 1e-7
 

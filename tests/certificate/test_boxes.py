@@ -108,6 +108,7 @@ def test_what_is_read_back_says_the_same():
     assert certificate.final_state == (None,) * 4
 
 
+@pytest.mark.usefixtures("framed_figures")
 def test_screen_page_and_statement_tell_the_box_and_claim_no_limit():
     saved = read_certificate(moved().to_dict())
     told = "every signal draws c into [1, 2], d into [0.5, 2], at the rate 1.99004; no limit is claimed"

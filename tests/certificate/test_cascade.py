@@ -145,7 +145,7 @@ def ratios_where_enclosed(part: CascadePart, sizes: np.ndarray) -> np.ndarray:
         return np.where(sizes > 0, sizes / part.deviation_bound(HALVINGS), 0)
 
 
-@pytest.mark.few(10)
+@pytest.mark.few(6)
 @pytest.mark.parametrize("seed", range(160))
 def test_bounds_are_above_where_agents_are_enclosed_by_no_integrator(seed: int):
     """From the beginning, from the third instant and from every one; what is near to its bound shows that it is."""

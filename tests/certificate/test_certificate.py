@@ -85,6 +85,7 @@ def precision() -> Iterator[None]:
     flint.ctx.prec = before
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("name", GRAPHS)
 def test_the_examples_behave_as_the_paper_reports(name: str):
     _, _, reported = select(name)[0]
@@ -285,7 +286,7 @@ def test_a_broken_certificate_is_refused(how: str, tmp_path: Path):
 # ---------------------------------------------------------------------- the proof, anew
 
 
-@pytest.mark.few(5)
+@pytest.mark.few(3)
 @pytest.mark.parametrize(("name", "kwargs"), class_cases((*ROWS, "disconnected 1.1 and isolated")))
 def test_the_json_alone_proves_the_claim(name: str, kwargs: dict):
     judge = Recheck(of_class(name))

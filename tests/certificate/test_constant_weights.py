@@ -137,6 +137,7 @@ def test_what_is_read_back_says_the_same(monkeypatch: pytest.MonkeyPatch):
     assert own.__dict__ == other.__dict__
 
 
+@pytest.mark.usefixtures("framed_figures")
 def test_screen_page_and_statement_tell_the_ends_of_constant_weights():
     saved = read_certificate(pair().to_dict())
     text = "\n".join(summary_lines(saved, "pair"))
@@ -148,6 +149,7 @@ def test_screen_page_and_statement_tell_the_ends_of_constant_weights():
     assert f"Where they end: {ends}." in re.sub("[$]", "", report_latex(saved))
 
 
+@pytest.mark.usefixtures("framed_figures")
 def test_where_modes_have_camps_of_their_own_each_ends_within_the_ends_of_all():
     modes = [[("a", "b", 1, 2), ("b", "a", 1, 1)], [("a", "b", -2, -1), ("b", "a", -1, -1)]]
     certificate = made(Family.switching([Family.from_intervals(edges) for edges in modes]), [0, 6])

@@ -135,6 +135,7 @@ def test_a_file_that_adds_restricted_signals_is_refused(sigma0):
     assert not report.accepted and f"restricted signals {why}" in str(report.reason)
 
 
+@pytest.mark.usefixtures("framed_figures")
 def test_pages_and_statements_say_what_slides(tmp_path):
     made = of_path()
     made.save(tmp_path / "c.json")

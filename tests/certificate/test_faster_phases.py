@@ -66,6 +66,7 @@ def test_phases_are_accepted_read_back_and_leave_less(name: str):
     )
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", KINDS)
 def test_deviations_stay_within_the_bounds_of_phases(name: str):
     part = part_of(made(name))

@@ -81,6 +81,7 @@ def reached(family: Family, x: list[Fraction], rng: random.Random) -> tuple[np.n
     return low, high
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("seed", thinned(range(12), 3))
 def test_every_signal_keeps_agents_within_the_ends_of_all_walks(seed: int):
     rng = random.Random(seed)
@@ -179,6 +180,7 @@ def test_boxes_have_an_order_and_obligations_of_their_own():
     assert check(resealed(older)).accepted
 
 
+@pytest.mark.usefixtures("framed_figures")
 def test_screen_page_statement_and_table_tell_them():
     certificate = made(MOVED, X0)
     saved = read_certificate(certificate.to_dict())

@@ -48,6 +48,7 @@ CHAIN = "source,target,weight\na,b,1\nb,c,-1\n"
 # ---------------------------------------------------------------------- what the file states
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("seed", thinned([0, 2, 3, 4, 5], 3))
 def test_who_misses_the_deadline_is_proved_of_final_states_that_are_enclosed(seed: int):
     """Above 120 agents the file states decimals, which are not the floats that were computed."""
@@ -78,6 +79,7 @@ def test_agents_that_begin_at_a_final_state_that_is_too_long_to_be_written(how: 
     assert made.checked.accepted, made.checked.reason
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(("decades", "seed"), [(1, 0), (2, 4), (2, 8), (2.5, 3), (3, 6)])
 def test_followers_of_ill_conditioned_equations_are_as_wide_as_is_proved(decades: float, seed: int):
     """A chain of 130 followers between two leaders; its weights are spread over twice so many decades."""
@@ -124,19 +126,20 @@ def rejecting(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     return tmp_path
 
 
+QUICK = ["chain.csv", "--method", "paper"]
 COMMANDS = {
-    "behaviour": ["chain.csv", "--expect", "stability"],
-    "rate": ["chain.csv", "--min-rate", "1000"],
-    "input": ["chain.csv", "--max-input", "0.001"],
-    "met": ["chain.csv", "--expect", "bipartite-consensus", "--min-rate", "0.001"],
-    "late": ["chain.csv", "--delay", "0.01", "--max-residual", "1e-9"],
-    "leaders": ["chain.csv", "--leader-speed", "1", "--max-input", "1e-3"],
-    "agents": ["chain.csv", "--agents", "2", "--max-input", "1e-3", "--expect", "stability"],
+    "behaviour": [*QUICK, "--expect", "stability"],
+    "rate": [*QUICK, "--min-rate", "1000"],
+    "input": [*QUICK, "--max-input", "0.001"],
+    "met": [*QUICK, "--expect", "bipartite-consensus", "--min-rate", "0.001"],
+    "late": [*QUICK, "--delay", "0.01", "--max-residual", "1e-9"],
+    "leaders": [*QUICK, "--leader-speed", "1", "--max-input", "1e-3"],
+    "agents": [*QUICK, "--agents", "2", "--max-input", "1e-3", "--expect", "stability"],
     "family": ["chain.csv", "other.csv", "--switching", "--expect", "stability", "--min-rate", "1000"],
 }
 
 
-@pytest.mark.few(13)
+@pytest.mark.few(9)
 @pytest.mark.parametrize("options", COMMANDS.values(), ids=COMMANDS)
 @pytest.mark.parametrize("long", [False, True], ids=["short", "long"])
 def test_where_the_check_rejects_nothing_is_claimed_refuted_or_written(options: list[str], long: bool, rejecting: Path):
@@ -152,7 +155,7 @@ def test_where_the_check_rejects_nothing_is_claimed_refuted_or_written(options: 
         assert word not in text
 
 
-@pytest.mark.few(6)
+@pytest.mark.few(4)
 @pytest.mark.parametrize("options", COMMANDS.values(), ids=COMMANDS)
 def test_where_the_check_rejects_json_tells_that_alone(options: list[str], rejecting: Path):
     run = ptcc("certify", *options, "--no-simulation", "--json", "-o", "c.json")

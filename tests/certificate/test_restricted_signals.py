@@ -189,6 +189,7 @@ def test_no_admissible_signal_leaves_the_error_bound_of_these_signals(more: bool
         assert (deviation_of_signal(certificate, remaining) <= certificate.deviation_bound(remaining)).all()
 
 
+@pytest.mark.usefixtures("framed_figures")
 def test_the_error_bound_of_seldom_switches_is_told_beside_that_of_every_signal():
     certificate = of_slowed(IN_TIME)
     every = float(certificate.deviation_bound([0.01]).max())
@@ -687,6 +688,7 @@ def test_claims_of_several_components_name_theirs():
     assert lines and all(line.startswith("component of ") for line in lines)
 
 
+@pytest.mark.usefixtures("framed_figures")
 def test_signals_of_which_nothing_is_claimed_stand_in_the_file(tmp_path: Path):
     family = Family.from_intervals([("a", "b", 1, 1), ("b", "a", 1, 1), ("b", "c", 0, 1), ("c", "b", 0, 1)])
     made = certify_family(family, NominalProtocol(), [1, 2, 3], signal=JointWindows(1, "0.3"))

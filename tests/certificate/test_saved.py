@@ -132,7 +132,8 @@ def test_a_sliding_mode_certificate_comes_back_as_it_was(name: str, tmp_path: Pa
 )
 def test_sets_of_starts_limits_and_noise_come_back(options: dict[str, Any], tmp_path: Path):
     protocol = ptcc.NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
-    made = certify_words(load_graph("fig3a"), protocol, [-4, 3, -1, 2, -2, 5], simulation=False, **options)
+    asked = {"simulation": False, "method": "paper", **options}
+    made = certify_words(load_graph("fig3a"), protocol, [-4, 3, -1, 2, -2, 5], **asked)
     agree(written(made, tmp_path), made)
 
 
@@ -185,6 +186,7 @@ def float_ball(x: Fraction) -> flint.arb:
 LITTLE = ptcc.Asks(expectations=Expectations(max_residual=Fraction(1, 1000)))
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("options", "says"),
     [
@@ -332,7 +334,8 @@ def test_without_a_start_there_is_no_bound_from_it(tmp_path: Path):
     "part", [{"protocol": ptcc.NominalProtocol(T=100)}, {"initial_state": (Fraction(1),) * 6}, {"final_state": None}]
 )
 def test_a_certificate_that_was_read_is_what_its_file_says(tmp_path: Path, part: dict[str, Any]):
-    ptcc.certify("fig3a", NOMINAL, [-4, 3, -1, 2, -2, 5], asks=ptcc.Asks(simulation=False)).save(tmp_path / "c.json")
+    asks = ptcc.Asks(simulation=False, method="paper")
+    ptcc.certify("fig3a", NOMINAL, [-4, 3, -1, 2, -2, 5], asks=asks).save(tmp_path / "c.json")
     saved = read_certificate(tmp_path / "c.json")
     with pytest.raises(ParameterError, match="certify the graph again"):
         saved.changed(**part)
@@ -341,7 +344,7 @@ def test_a_certificate_that_was_read_is_what_its_file_says(tmp_path: Path, part:
 
 @pytest.mark.parametrize("value", [math.nan, {1}, 10**5000], ids=["nan", "set", "long"])
 def test_a_mapping_that_is_no_json_is_refused(value: Any):
-    document = json.loads(ptcc.certify("fig1a", NOMINAL, asks=ptcc.Asks(simulation=False)).to_json())
+    document = json.loads(ptcc.certify("fig1a", NOMINAL, asks=ptcc.Asks(simulation=False, method="paper")).to_json())
     document["unverified"]["value"] = value
     with pytest.raises(FormatError, match="JSON"):
         read_certificate(document)
@@ -349,7 +352,7 @@ def test_a_mapping_that_is_no_json_is_refused(value: Any):
 
 def test_a_run_whose_agents_stand_in_another_order_is_refused():
     edges = [("a", "b", 1), ("b", "c", -2), ("c", "a", 1), ("c", "d", 3)]
-    certificate = ptcc.certify(edges, NOMINAL, [1, 2, 3, 4], asks=ptcc.Asks(simulation=False))
+    certificate = ptcc.certify(edges, NOMINAL, [1, 2, 3, 4], asks=ptcc.Asks(simulation=False, method="paper"))
     run = ptcc.simulate(edges[::-1], NOMINAL, dict(zip("abcd", [1, 2, 3, 4], strict=True)))
     assert run.graph == certificate.graph and run.graph.labels != certificate.graph.labels
     with pytest.raises(ParameterError, match="another order"):

@@ -393,6 +393,7 @@ POWERS = (Fraction(1, 3), Fraction(1), Fraction(9, 5))
 OF_EACH_ROW = ("1.1", "1.2", "2.1 K=1", "2.1 K>=2", "2.2", "3.1 mixed", "3.1 mixed no single", "3.2")
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(("name", "kwargs"), class_cases((*OF_EACH_ROW[1::2], "disconnected 1.2 2.1 isolated")))
 def test_every_row_keeps_its_bounds(name: str, kwargs: dict):
     number = [known for known, _ in all_classes()].index(name)

@@ -59,6 +59,7 @@ def weak(k: int, sliding: bool = False) -> Certificate:
 # ---------------------------------------------------------------------- usefulness
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(("k", "sliding"), thinned([(k, k % 3 == 0) for k in range(1, 11)], 2))
 def test_the_gains_that_are_named_leave_one_percent_and_bound_the_input(k: int, sliding: bool):
     """Certified with what the line says, nothing else changed, at most a hundredth is left, of a bounded input."""

@@ -23,12 +23,11 @@ from agent_documents import Setting, damping_bound, document, final_state, oblig
 from asked import certify_family, certify_words
 from cpu_time import at_most
 from generators import all_classes, random_graph
-from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
 from mutations import Json, at, changed, judged_mutants, mutants, nudged, resealed
 from oracle_agents import false_claims_of_agents
+from schema_validator import VALIDATOR
 
 from ptcc_certify.certificate.certification import certify
-from ptcc_certify.certificate.json_schema import json_schema
 from ptcc_certify.checker import check, common_motion
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
@@ -36,7 +35,6 @@ from ptcc_certify.model import NominalProtocol
 
 F = Fraction
 CLASSES = dict(all_classes())
-VALIDATOR = Draft202012Validator(json_schema())
 #: Two camps of three that hear each other, and a follower that is an enemy of one.
 CAMPS = [("a", "b", 1), ("b", "c", -2), ("c", "a", "-1/2"), ("c", "f", -1), ("a", "f", 2)]
 #: Unbalanced: three that are all enemies.
@@ -575,6 +573,7 @@ def made_by_the_program(seed: int, method: str) -> Json:
     return json.loads(certify_words(case.graph, case.protocol, case.x0, **options).to_json())
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("seed", [3, 13])
 def test_what_the_program_makes_is_true(seed: int):
     data = made_by_the_program(seed, "paper")

@@ -514,6 +514,7 @@ def test_a_rate_above_the_spectral_rate(name: str):
         rejected(forged, rf"rate of lyapunov\.functions\[{k}\]")
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("name", ["1.1", "1.2", "2.1 K>=2", "2.2", "3.1 mixed", "3.2"])
 def test_a_limit_below_the_spectral_rate(name: str):
     """Nor is a limit accepted that some eigenvalue contradicts."""

@@ -7,19 +7,17 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
-from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
 from late_certificates import plain, whole, with_messages
 from mutations import Json, changed, resealed
 from oracle import number
 from oracle_messages import late_claims
+from schema_validator import VALIDATOR
 
-from ptcc_certify.certificate.json_schema import json_schema
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.model import NominalProtocol
 from ptcc_certify.model.late_messages import LateMessages
 
-SCHEMA = json_schema()
 TOP = ("messages", "lmi")
 CASES = [(1, False), (2, True), (3, True)]
 
@@ -38,11 +36,12 @@ def scaled(text: str, factor: Fraction) -> str:
     return str(number(text) * factor)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(("seed", "own"), CASES)
 def test_what_is_made_is_accepted_by_both_arithmetics_and_kept_to_by_motions(seed: int, own: bool):
     data = whole(seed, own)
     assert data["messages"]["lmi"] is not None
-    Draft202012Validator(SCHEMA).validate(data)
+    VALIDATOR.validate(data)
     assert check(data).accepted and check(data, stdlib=True).accepted
     assert late_claims(data) == []
 

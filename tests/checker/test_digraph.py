@@ -73,6 +73,7 @@ def conflicting(graph: nx.DiGraph, nodes: set[int]) -> bool:
     return True
 
 
+@pytest.mark.few(60)
 @pytest.mark.parametrize("seed", range(160))
 def test_both_are_what_the_definitions_say(seed: int):
     n, edges, scale = drawn(seed)

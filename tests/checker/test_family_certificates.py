@@ -21,9 +21,9 @@ from asked import certify_family, family_certificate
 from common_kernel_families import random_family as with_common_kernel
 from cpu_time import at_most
 from families import KINDS, random_family
-from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
 from mutations import Json, at, changed, containers, leaves, of_container, of_leaf, resealed, same_claim
 from oracle_family_certificates import FamilyOracle, false_family_claims
+from schema_validator import VALIDATOR
 from selection import thinned
 
 from ptcc_certify import checker
@@ -32,7 +32,6 @@ from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.certificate_file import RejectedCertificate
 from ptcc_certify.certificate.document import certificate_document
 from ptcc_certify.certificate.family_proof import ComponentProof
-from ptcc_certify.certificate.json_schema import json_schema
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
@@ -495,7 +494,6 @@ def test_no_mutant_of_thousands_is_accepted_that_is_false(capsys: pytest.Capture
 # ---------------------------------------------------------------------- the shape
 
 
-VALIDATOR = Draft202012Validator(json_schema())
 NUMBERS_AS_KEYS = "rows is not an object with numbers as keys"
 
 

@@ -58,6 +58,7 @@ def document() -> Json:
     return {**certificate(1).to_dict(), "unverified": {}}
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("modes", [1, 2])
 def test_random_unbalanced_families_of_hundreds_of_agents_are_certified_with_a_rate(modes):
     cert = certificate(modes)

@@ -500,6 +500,7 @@ def test_sliding_variables_move_until_the_instant_is_quiet():
     assert early.decay((F(1, 2), F(1, 2))) == (0, 0) and early.decay((F(1), F(1)))[1] == pytest.approx(1)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("seed", thinned(range(8), 3))
 def test_no_sliding_variable_moves_the_error_further(seed: int):
     """``dE = -L E ds - L d sigma``, ``sigma' = -(mu2 + power/(T_r - t)) sigma - s f`` with ``f`` that switches."""

@@ -11,17 +11,16 @@ from typing import Any
 import numpy as np
 import pytest
 from cpu_time import at_most
-from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
 from late_certificates import Late, led_graph, nominal, obligation, plain, settling, with_leaders, with_messages
 from mutations import Json, at, changed, resealed
 from oracle import number
 from oracle_messages import late_claims
+from schema_validator import VALIDATOR
 from selection import thinned
 from side_files import Side
 
 from lmi.exact.work import WorkError, limited
 from ptcc_certify.certificate.certification import certify
-from ptcc_certify.certificate.json_schema import json_schema
 from ptcc_certify.checker import check, graph
 from ptcc_certify.checker.array_digraph import ArrayDigraph
 from ptcc_certify.checker.array_late_steps import ArraySteps
@@ -32,8 +31,6 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.late_messages import LateMessages
 
-SCHEMA = json_schema()
-VALIDATOR = Draft202012Validator(SCHEMA)
 TOP = ("messages",)
 F = Fraction
 
@@ -155,7 +152,7 @@ def test_what_follows_is_accepted_with_and_without_arrays_and_has_the_shape_of_t
         assert report.obligations == reports[0].obligations
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", thinned(NAMES, 3))
 def test_motions_keep_to_what_is_accepted(name: str):
     assert late_claims(samples()[name]) == []

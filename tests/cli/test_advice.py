@@ -361,6 +361,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         Path(name).write_text(text)
 
 
+@pytest.mark.few(15)
 @pytest.mark.parametrize("line", thinned(COMMANDS, 8))
 def test_what_is_advised_is_not_refused(line: str) -> None:
     command = tuple(line.split())

@@ -17,6 +17,8 @@ from bad_inputs import ptcc
 
 import ptcc_certify
 
+pytestmark = pytest.mark.usefixtures("framed_figures")
+
 CERTIFY = ("certify", "fig1a", "--method", "paper", "--T", "2", "--no-simulation")
 
 

@@ -33,6 +33,7 @@ from ptcc_certify.graphs.io import write_graph
 from ptcc_certify.graphs.structure import BEHAVIOURS, analyse
 
 X0 = "5,2,-4,3,-2,1"
+PAPER = ("--method", "paper", "--no-simulation")
 
 
 @pytest.fixture(autouse=True)
@@ -101,6 +102,7 @@ def test_the_names_of_the_table_differ():
 SAMPLE = ("weight NaN", "XML entity bomb", "T NaN", "unknown command")
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("case", [c for c in BAD_INPUTS if c.name in SAMPLE], ids=lambda case: case.name)
 def test_bad_input_to_a_process_of_its_own(case: BadInput, folder: Path):
     write(case.files, folder)
@@ -184,7 +186,7 @@ def test_an_error_of_the_program_is_not_taken_for_a_violated_bound(monkeypatch: 
         raise RuntimeError("a bug")
 
     monkeypatch.setattr("ptcc_certify.certificate.certification.certify_case", fail)
-    run = ptcc("certify", "fig1b")
+    run = ptcc("certify", "fig1b", *PAPER)
     assert run.code == 70
     assert "RuntimeError" in run.err and "report" in run.err and run.out == ""
     for error, code in ((MemoryError(), 2), (OverflowError(), 2), (KeyboardInterrupt(), 130)):
@@ -192,7 +194,7 @@ def test_an_error_of_the_program_is_not_taken_for_a_violated_bound(monkeypatch: 
             "ptcc_certify.certificate.certification.certify_case",
             lambda *_, error=error, **__: (_ for _ in ()).throw(error),
         )
-        run = ptcc("certify", "fig1b")
+        run = ptcc("certify", "fig1b", *PAPER)
         assert (run.code, run.out, len(run.err.strip().splitlines())) == (code, "", 1)
 
 
@@ -211,9 +213,9 @@ def test_the_method_decides_which_classes_are_searched(method: str):
 
 
 def test_the_bound_at_an_instant_is_printed_for_every_agent():
-    run = detailed("certify", "fig3a", "--x0", X0, "--at", "0.3")
+    run = detailed("certify", "fig3a", *PAPER, "--x0", X0, "--at", "0.3")
     assert run.code == 0 and "at t = 0.3: 1 " in run.out and len(run.out.splitlines()) <= 24
-    sliding = detailed("certify", "fig3a", "--protocol", "sliding-mode", "--sigma0", "random", "--at", "0.9")
+    sliding = detailed("certify", "fig3a", *PAPER, "--protocol", "sliding-mode", "--sigma0", "random", "--at", "0.9")
     assert sliding.code == 0 and "at t = 0.9: 1 " in sliding.out and len(sliding.out.splitlines()) <= 24
     for bad in ("1", "-0.1", "soon", "nan", "1e999"):
         refused = ptcc("certify", "fig3a", f"--at={bad}")
@@ -237,7 +239,7 @@ def test_check_reads_the_graph_as_its_reader_says_not_its_sender(folder: Path):
     """Orientation, repeated edges, self-loops: what only the sender said is named, and the check fails."""
     Path("g.csv").write_text("a,b,1\na,b,1\nb,c,-0.5\nc,c,1\nc,a,2\nc,d,3\n")
     reading = ("--edges", "listens", "--duplicates", "sum", "--drop-self-loops")
-    assert ptcc("certify", "g.csv", *reading, "--no-simulation", "-o", "c.json").code == 0
+    assert ptcc("certify", "g.csv", "--method", "paper", *reading, "--no-simulation", "-o", "c.json").code == 0
     run = detailed("check", "c.json", "g.csv", *reading)
     assert run.code == 0
     assert run.out.splitlines()[0] == f"graph      g.csv, read as the options say: {' '.join(reading)}"
@@ -260,12 +262,12 @@ def test_check_reads_the_graph_as_its_reader_says_not_its_sender(folder: Path):
 def test_check_tells_from_standard_input_what_would_agree(folder: Path):
     content = b"a,b,1\nb,c,2\n"
     Path("ties.csv").write_bytes(content)
-    assert ptcc("certify", "ties.csv", "--undirected", "--no-simulation", "-o", "t.json").code == 0
+    assert ptcc("certify", "ties.csv", "--method", "paper", "--undirected", "--no-simulation", "-o", "t.json").code == 0
     assert ptcc("check", "t.json", "ties.csv", "--undirected").code == 0
     for words, stdin in (("ties.csv", b""), ("-", content)):
         run = ptcc("check", "t.json", words, stdin=stdin)
         assert run.code == 1 and "accepted if --undirected is what you mean" in " ".join(run.out.split())
-    assert ptcc("certify", "ties.csv", "--no-simulation", "-o", "p.json").code == 0
+    assert ptcc("certify", "ties.csv", "--method", "paper", "--no-simulation", "-o", "p.json").code == 0
     run = ptcc("check", "p.json", "ties.csv", "--undirected")
     assert run.code == 1 and "accepted if --no-undirected is what you mean" in " ".join(run.out.split())
 
@@ -285,7 +287,7 @@ def test_check_takes_every_option_about_reading_that_other_commands_take():
 def test_a_scenario_says_how_check_reads_its_graph(folder: Path):
     Path("g.csv").write_text("a,b,1\nb,c,-0.5\nc,a,2\nc,d,3\n")
     Path("s.toml").write_text('[graph]\nfile = "g.csv"\nedges = "listens"\n')
-    assert ptcc("certify", "s.toml", "--no-simulation", "-o", "c.json").code == 0
+    assert ptcc("certify", "s.toml", "--method", "paper", "--no-simulation", "-o", "c.json").code == 0
     run = detailed("check", "c.json", "s.toml")
     assert run.code == 0 and run.out.startswith("graph      g.csv, read as the scenario says: --edges listens\n"), run
     assert ptcc("check", "c.json", "g.csv").code == 1
@@ -317,7 +319,7 @@ def test_a_scenario_says_how_check_reads_its_graph(folder: Path):
 )
 def test_a_graph_that_is_another_one_is_told_apart(folder: Path, edges: str, said: str):
     Path("g.csv").write_text("a,b,1\nb,c,-0.123456789\nc,a,2\nc,d,3\n")
-    assert ptcc("certify", "g.csv", "--no-simulation", "-o", "c.json").code == 0
+    assert ptcc("certify", "g.csv", "--method", "paper", "--no-simulation", "-o", "c.json").code == 0
     Path("h.csv").write_text(edges.replace(" ", "\n") + "\n")
     run = detailed("check", "c.json", "h.csv")
     assert run.code == 1 and run.err == ""
@@ -330,7 +332,7 @@ def test_weights_that_exact_proofs_cannot_take_are_refused_in_one_line(folder: P
     ends = [(i, (i + k) % nodes) for i in range(nodes) for k in (1, 2)]
     rows = [f"n{i},n{j},{10**digits + 2 * k + 1}/{10**digits + 6 * k + 7}" for k, (i, j) in enumerate(ends)]
     Path("g.csv").write_text("\n".join(rows) + "\n")
-    run = ptcc("certify", "g.csv")
+    run = ptcc("certify", "g.csv", *PAPER)
     assert run.code == 2 and run.out == "" and len(run.err.splitlines()) == 1
     assert f"too many for exact proofs of {nodes} agents (the longest is that of edge n" in run.err
     assert run.err.rstrip().endswith("round them, to 17 digits say")
@@ -364,21 +366,21 @@ def test_long_weights_short_of_the_limit_are_certified(folder: Path, digits: int
     ]
     Path("g.csv").write_text("\n".join(rows) + "\n")
     start = ",".join(f"{k}.{10**digits + k}" for k in range(6))
-    run = ptcc("certify", "g.csv", "--no-simulation", "--x0", start, "--T", f"1.{10**digits + 1}")
+    run = ptcc("certify", "g.csv", "--method", "paper", "--no-simulation", "--x0", start, "--T", f"1.{10**digits + 1}")
     assert run.code == 0 and run.out.splitlines()[-1].startswith("verdict    certified; ")
 
 
 def test_parameters_of_thousands_of_digits_are_refused_by_name(folder: Path):
     long = "1." + "123456789" * 300
     for flag, name in (("--T", "T"), ("--rho1", "rho1"), ("--kappa", "kappa")):
-        run = ptcc("certify", "fig1a", flag, long, "--no-simulation")
+        run = ptcc("certify", "fig1a", "--method", "paper", flag, long, "--no-simulation")
         assert run.code == 2 and len(run.err.splitlines()) == 1, run.err
         assert name in run.err and "round it" in run.err
 
 
 def test_check_tells_every_obligation_and_its_verdict_by_exit_code(folder: Path):
     """0 proved, 1 rejected (a changed field, another graph), 4 undecided; the same from the module."""
-    assert ptcc("certify", "fig5b", "-o", "c.json").code == 0
+    assert ptcc("certify", "fig5b", "--no-simulation", "-o", "c.json").code == 0
     for options in ((), ("--stdlib",), ("fig5b",)):
         run = detailed("check", "c.json", *options)
         assert run.code == 0 and run.err == ""
@@ -420,13 +422,13 @@ def test_check_tells_every_obligation_and_its_verdict_by_exit_code(folder: Path)
 
 def test_a_rate_beyond_the_upper_bound_is_3_and_one_below_it_4():
     """fig1b: the bound by its slowest mode, below that by its mean eigenvalue; below it, doubt."""
-    data = one_object(ptcc("certify", "fig1b", "--json").out)
+    data = one_object(ptcc("certify", "fig1b", *PAPER, "--json").out)
     proved, limit = Fraction(data["rates"]["proved"]), Fraction(data["rates"]["upper_bound"])
     mean = 2 * sum(abs(Fraction(w)) for _, _, w in data["graph"]["edges"]) / 5  # trace(L) over 5 nonzero eigenvalues
     hair = Fraction(1, 10**6)
     assert proved + hair < limit < mean
     for wanted, code in ((proved, 0), (proved + hair, 4), (limit, 4), (limit + hair, 3), (mean, 3)):
-        run = detailed("certify", "fig1b", "--min-rate", str(wanted))
+        run = detailed("certify", "fig1b", *PAPER, "--min-rate", str(wanted))
         assert run.code == code
         verdict = run.out.splitlines()[-1].removeprefix("verdict    ")
         assert verdict.startswith({0: "met: rate >= ", 3: "refuted: rate >= ", 4: "left open: rate >= "}[code])
@@ -510,6 +512,7 @@ def odd_graphs() -> dict[str, str]:
     }
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("command", ["classify", "certify"])
 @pytest.mark.parametrize("name", [*GRAPHS, "apart", "one", "isolated"])
 def test_json_is_exactly_one_object(command: str, name: str):
@@ -527,7 +530,7 @@ def test_json_is_exactly_one_object(command: str, name: str):
 
 
 def test_json_goes_out_also_when_an_expectation_is_refuted():
-    run = ptcc("certify", "fig1a", "--json", "--expect", "consensus", "-o", "c.json")
+    run = ptcc("certify", "fig1a", *PAPER, "--json", "--expect", "consensus", "-o", "c.json")
     assert run.code == 3 and run.err == "verdict    refuted: consensus (it is stability); the rest is certified\n"
     assert one_object(run.out) == read("c.json")
 
@@ -536,20 +539,23 @@ def test_json_goes_out_also_when_an_expectation_is_refuted():
 
 
 def test_the_certificate_is_written_whole(folder: Path):
-    run = ptcc("certify", "fig1b", "--x0", X0, "-o", "c.json", "--json")
+    run = ptcc("certify", "fig1b", *PAPER, "--x0", X0, "-o", "c.json", "--json")
     data = one_object(run.out)
     assert one_object(Path("c.json").read_text(encoding="utf-8")) == data == read("c.json")
     assert listing(folder) == ["c.json"]
-    run = ptcc("certify", "fig1b", "--x0", X0, "-o", "c.json")
+    run = ptcc("certify", "fig1b", *PAPER, "--x0", X0, "-o", "c.json")
     assert run.out.splitlines()[-1] == "written    c.json"
     Path("c.json").write_text("an older file")
-    assert ptcc("certify", "fig1b", "--x0", "1,2", "-o", "c.json").code == 2
+    assert ptcc("certify", "fig1b", *PAPER, "--x0", "1,2", "-o", "c.json").code == 2
     assert Path("c.json").read_text() == "an older file"
 
 
 def test_a_graph_from_standard_input():
     text = b"a,b,-1\nb,a,-1\n"
-    for run in (ptcc("certify", "-", "--json", stdin=text), process("certify", "-", "--json", stdin=text)):
+    for run in (
+        ptcc("certify", "-", *PAPER, "--json", stdin=text),
+        process("certify", "-", "--json", *PAPER, stdin=text),
+    ):
         data = one_object(run.out)
         assert data["graph"]["edges"] == [["b", "a", "-1"], ["a", "b", "-1"]]
         assert data["claim"]["behaviour"] == "bipartite consensus"
@@ -571,14 +577,17 @@ def test_starts_in_every_form(form: str):
     Path("x0.csv").write_text("node,value\n6,1\n" + "".join(f"{k + 1},{v}\n" for k, v in enumerate(X0.split(",")[:5])))
     labelled = "6=1," + ",".join(f"{k + 1}={v}" for k, v in enumerate(X0.split(",")[:5]))
     data = one_object(
-        ptcc("certify", "fig1b", "--json", "--x0", {"plain": X0, "labelled": labelled, "file": "x0.csv"}[form]).out
+        ptcc(
+            "certify", "fig1b", *PAPER, "--json", "--x0", {"plain": X0, "labelled": labelled, "file": "x0.csv"}[form]
+        ).out
     )
     assert data["initial_state"] == dict(zip("123456", X0.split(","), strict=True))
 
 
 def test_a_random_start_depends_on_the_seed_alone():
     drawn = [
-        one_object(ptcc("certify", "fig1b", "--json", "--seed", seed).out)["initial_state"] for seed in ("0", "0", "7")
+        one_object(ptcc("certify", "fig1b", *PAPER, "--json", "--seed", seed).out)["initial_state"]
+        for seed in ("0", "0", "7")
     ]
     assert drawn[0] == drawn[1] != drawn[2]
     assert all(abs(Fraction(x)) <= 10 and Fraction(x) * 1000 % 1 == 0 for x in drawn[2].values())
@@ -590,7 +599,7 @@ def test_edges_are_read_the_way_that_is_asked_and_it_is_said():
         options = [] if edges is None else ["--edges", edges]
         assert one_object(ptcc("classify", "g.csv", "--json", *options).out)["structure"]["leaders"] == [leader]
         assert words in ptcc("classify", "g.csv", *options).out
-        assert words in ptcc("certify", "g.csv", *options).out
+        assert words in ptcc("certify", "g.csv", *PAPER, *options).out
 
 
 def test_what_was_merged_dropped_or_mirrored_is_said():
@@ -626,7 +635,7 @@ def test_labels_of_any_kind_are_printed_safely_and_kept():
     assert_refused(run)
     assert "\u202e" not in run.err
     np.savez("surrogate.npz", A=[[0.0, 1.0], [1.0, 0.0]], labels=["\ud800", "b"])
-    run = ptcc("certify", "surrogate.npz", "-o", "c.json", "--json")
+    run = ptcc("certify", "surrogate.npz", *PAPER, "-o", "c.json", "--json")
     assert run.code == 0
     assert read("c.json")["graph"]["nodes"] == one_object(run.out)["graph"]["nodes"] == ["\ud800", "b"]
     assert ptcc("simulate", "surrogate.npz").code == 0
@@ -726,7 +735,7 @@ def test_simulate_prints_csv_up_to_the_deadline_and_past_it():
     assert remaining[remaining > 0].min() == pytest.approx(1e-8)
     assert len(rows) >= 50
     assert states[0].tolist() == [float(x) for x in X0.split(",")]
-    final = one_object(ptcc("certify", "fig1b", "--T", "0.6", "--x0", X0, "--json").out)["final_state"]
+    final = one_object(ptcc("certify", "fig1b", *PAPER, "--T", "0.6", "--x0", X0, "--json").out)["final_state"]
     settled = states[remaining == 0]
     assert np.abs(settled - [float(Fraction(final[k])) for k in "123456"]).max() < 1e-8
 
@@ -790,7 +799,7 @@ def test_simulate_writes_tables(name: str):
     ],
 )
 def test_max_input_is_met_refuted_or_undecided(most: str, code: int, says: str):
-    run = detailed("certify", "fig1a", "--no-simulation", "--max-input", most)
+    run = detailed("certify", "fig1a", "--method", "paper", "--no-simulation", "--max-input", most)
     assert run.code == code and says in run.out.splitlines()[-1]
 
 
@@ -1052,7 +1061,7 @@ def test_classify_loads_nothing_heavy():
 def test_a_terminal_sees_which_step_is_at_work_and_standard_output_does_not(tmp_path: Path):
     """Standard error is a pseudo-terminal: a bar comes and goes; without one there is nothing."""
     pty = pytest.importorskip("pty")
-    words = [sys.executable, "-c", "from ptcc_certify.cli import main; main()", "certify", "fig1a", "--json"]
+    words = [sys.executable, "-c", "from ptcc_certify.cli import main; main()", "certify", "fig1a", "--json", *PAPER]
     own, other = pty.openpty()
     run = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=other, cwd=tmp_path)
     os.close(other)

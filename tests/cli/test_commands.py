@@ -210,6 +210,7 @@ def test_a_certificate_is_checked_from_standard_input(certificate: str):
     assert tight.code == 2 and "--memory" in tight.err
 
 
+@pytest.mark.usefixtures("framed_figures")
 def test_a_report_is_written_of_a_certificate_from_standard_input(certificate: str):
     content = Path(certificate).read_bytes()
     Path("certificate.json").write_bytes(content)

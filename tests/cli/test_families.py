@@ -16,6 +16,8 @@ from ptcc_certify.graphs.io import read_family
 from ptcc_certify.report.facts.claim import _cut
 from ptcc_certify.report.text_layout import wrap_text
 
+pytestmark = pytest.mark.usefixtures("framed_figures")
+
 INTERVALS = "source,target,weight_min,weight_max"
 #: "day" and "night" keep the same camps, "spoiled" others.
 FILES = {

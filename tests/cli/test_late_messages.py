@@ -8,6 +8,7 @@ import json
 import re
 from dataclasses import replace
 from fractions import Fraction
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +35,8 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.simulation.late_messages import simulate_late
 
+pytestmark = pytest.mark.usefixtures("framed_figures")
+
 TEAM = "source,target,weight,delay\na,b,1,0.01\nb,c,1,0.02\nc,b,1,0.01\nc,d,-2,0.005\n"
 CHAIN = "source,target,weight\na,b,1\nb,c,-1\n"
 SCENARIO = """[graph]
@@ -47,7 +50,8 @@ x0 = [1, 3, 4, -4]
 method = "paper"
 simulation = false
 """
-QUICK = ("--rho2", "4", "--kappa", "1", "--method", "paper", "--no-simulation")
+PAPER = ("--method", "paper", "--no-simulation")
+QUICK = ("--rho2", "4", "--kappa", "1", *PAPER)
 START = ("--x0", "1,3,4,-4")
 
 
@@ -110,7 +114,7 @@ def test_the_delay_up_to_which_a_wanted_residual_is_told_to_be_certified_is_cert
     graph: str, delay: str, more: tuple[str, ...], status: str
 ) -> None:
     Path("ring.csv").write_text("a,b,1\nb,a,1\nb,c,-2\nc,d,1.5\nd,c,0.7\na,d,-1\n")
-    gains = QUICK if graph == "team.csv" else QUICK[4:]
+    gains = QUICK if graph == "team.csv" else PAPER
     run = ptcc("certify", graph, "--delay", delay, *more, *START, *gains)
     text = " ".join(run.out.partition("verdict")[2].split())
     told = re.search(r"certified where nothing is older than ([\d.]+\d)", text)
@@ -323,14 +327,18 @@ def test_small_delays_of_a_leader_group_are_certified_under_a_cap_up_to_a_limit_
         protocol,
         [3, 1, 2],
         messages=LateMessages(delay="0.0002", own_delay=True, gain_cap=20),
-        asks=Asks(simulation=False),
+        asks=Asks(simulation=False, method="paper"),
     )
     assert cert.verdict == "certified"
     assert cert.late is not None
     assert cert.late.form is not None
     assert 0.0002 < (cert.late.longest_delay or 0) < 0.1
     long = certify(
-        group, protocol, [3, 1, 2], messages=LateMessages(delay="0.5", gain_cap=20), asks=Asks(simulation=False)
+        group,
+        protocol,
+        [3, 1, 2],
+        messages=LateMessages(delay="0.5", gain_cap=20),
+        asks=Asks(simulation=False, method="paper"),
     )
     assert int(long.assessment.exit_code) == 4
     assert "this certificate's limit is a delay of" in long.assessment.text
@@ -338,7 +346,7 @@ def test_small_delays_of_a_leader_group_are_certified_under_a_cap_up_to_a_limit_
 
 def test_followers_of_a_leader_group_are_certified_without_a_cap_where_the_leaders_hear_each_other_at_once() -> None:
     Path("led.csv").write_text("source,target,weight,delay\np,q,1,0\nq,p,2,0\np,f,-1,0.01\nf,g,1,0.02\ng,f,0.5,0.02\n")
-    words = ("certify", "led.csv", "--delay", "delay", "--rho2", "12", "--x0", "1,3,4,-4")
+    words = ("certify", "led.csv", "--delay", "delay", "--rho2", "12", *START, *PAPER)
     run = ptcc(*words, "--max-residual", "1", "--at", "0.9", "-v", "-o", "c.json")
     text = " ".join(run.out.split())
     assert run.code == 0 and "leaders hear each other at once, and settle by themselves" in text, run
@@ -360,7 +368,7 @@ def test_a_leader_group_without_an_initial_state_is_told_that_it_needs_one() -> 
     group = [("p", "q", 1), ("q", "p", 2), ("p", "f", -1)]
     late = LateMessages({("p", "f"): "0.01"})
     open_ = certify(
-        group, NominalProtocol(T=1, rho1=1, rho2=4, kappa=1), messages=late, asks=Asks(simulation=False)
+        group, NominalProtocol(T=1, rho1=1, rho2=4, kappa=1), messages=late, asks=Asks(simulation=False, method="paper")
     ).assessment
     assert "nothing is proved of what is left at T; give an initial state" in open_.text
 
@@ -413,7 +421,7 @@ def test_a_late_own_state_beyond_the_threshold_of_constant_gain_is_said_to_diver
 
 
 def test_a_gain_at_which_the_bound_of_small_delays_is_singular_is_no_defect() -> None:
-    run = ptcc("certify", "team.csv", "--delay", "0.05", "--gain-cap", "20", "--no-simulation")
+    run = ptcc("certify", "team.csv", "--delay", "0.05", "--gain-cap", "20", *PAPER)
     assert run.code == 0, run
 
 
@@ -425,17 +433,17 @@ def test_bounds_are_told_at_an_instant_that_is_asked_for() -> None:
 
 
 def test_an_input_that_is_not_bounded_while_leaders_move_is_told_with_the_gain_that_bounds_it() -> None:
-    weak = ptcc("certify", "team.csv", "--leader-speed", "1", *START, *QUICK[4:], "--rho2", "0.1", "--kappa", "1")
+    weak = ptcc("certify", "team.csv", "--leader-speed", "1", *START, *PAPER, "--rho2", "0.1", "--kappa", "1")
     least = re.search(r"INPUT      not proved bounded while leaders move; --rho2 (\S+) bounds it", weak.out)
     assert least is not None, weak
-    strong = ptcc("certify", "team.csv", "--leader-speed", "1", *START, *QUICK[4:], "--rho2", least[1], "--kappa", "1")
+    strong = ptcc("certify", "team.csv", "--leader-speed", "1", *START, *PAPER, "--rho2", least[1], "--kappa", "1")
     assert "input      bounded up to T" in strong.out, strong
     verdict = " ".join(weak.out.partition("verdict")[2].split())
     assert f"the input is not proved bounded; --rho2 {least[1]} bounds the input" in verdict
 
 
 def test_the_verdict_with_late_messages_is_about_these_and_proposes_no_gains_for_messages_at_once() -> None:
-    weak = (*QUICK[4:], "--rho2", "0.1", "--kappa", "1")
+    weak = (*PAPER, "--rho2", "0.1", "--kappa", "1")
     for words, caveat in (((), "the input is not proved bounded"), (("--gain-cap", "1"), "")):
         run = ptcc("certify", "team.csv", "--delay", "0.02", *START, *weak, *words)
         verdict = " ".join(run.out.partition("verdict")[2].split())
@@ -557,15 +565,15 @@ def test_what_is_not_simulated_beside_late_messages_is_refused(words: tuple[str,
 
 def test_late_messages_and_leaders_that_move_from_certify_to_page() -> None:
     words = ("--delay", "0.02", "--leader-speed", "0.5", "--delta", "0.2", *START)
-    run = ptcc("certify", "team.csv", *words, "--max-residual", "9", "-o", "both.json")
+    run = ptcc("certify", "team.csv", *words, *PAPER, "--max-residual", "9", "-o", "both.json")
     text = " ".join(run.out.split())
     assert run.code == 0 and "leaders speed |x_j'| <= 0.5; any |d_k| <= 0.2" in text, run
     assert "of its target at T, within" in text and "of that no gain takes out of this bound" in text
     assert "nothing late, leaders at rest" in text and "x(T)" not in text and "met: within 9 at T" in text
     assert ptcc("check", "both.json").code == 0
-    verbose = " ".join(ptcc("certify", "team.csv", *words, "-v").out.split())
+    verbose = " ".join(ptcc("certify", "team.csv", *words, *PAPER, "-v").out.split())
     assert "given nothing late, leaders at rest, without disturbances, in what follows" in verbose
-    assert "|u_k| <=" in " ".join(ptcc("certify", "team.csv", *words, "--gain-cap", "9").out.split())
+    assert "|u_k| <=" in " ".join(ptcc("certify", "team.csv", *words, *PAPER, "--gain-cap", "9").out.split())
     for name, said in (
         ("both.html", "nothing late, leaders at rest, without disturbances, in what follows"),
         ("both.tex", "nothing late, leaders at rest, without disturbances, in what follows"),
@@ -575,7 +583,7 @@ def test_late_messages_and_leaders_that_move_from_certify_to_page() -> None:
     assert ptcc("plot", "both.json", "--what", "late", "-o", "both.svg").code == 0
     assert ptcc("simulate", "team.csv", *words, "-o", "both.csv").code == 0
     assert "target(" in Path("both.csv").read_text(encoding="utf-8").splitlines()[0]
-    strict = ptcc("certify", "team.csv", *words, "--expect", "containment")
+    strict = ptcc("certify", "team.csv", *words, *PAPER, "--expect", "containment")
     assert strict.code in (3, 4), strict
 
 
@@ -708,10 +716,16 @@ def test_a_file_without_anything_proved_of_moving_leaders_still_says_that_they_w
     assert "left open: leaders that move" in saved.assessment.text and int(saved.assessment.exit_code) == 4
 
 
+@cache
+def of_group() -> str:
+    """The file of a certificate by which nothing is proved of late messages."""
+    assert ptcc("certify", *GROUP, "--delay", "1", "-o", "c.json").code == 4
+    return Path("c.json").read_text()
+
+
 @pytest.mark.parametrize("asked", [None, 3, {}, {"messages": 1}, {"messages": {"latency": [], "packets": None}}])
 def test_what_a_file_says_of_messages_that_were_asked_for_may_be_of_any_content(asked: object) -> None:
-    assert ptcc("certify", *GROUP, "--delay", "1", "-o", "c.json").code == 4
-    data = json.loads(Path("c.json").read_text())
+    data = json.loads(of_group())
     data["unverified"]["asked"] = asked
     Path("c.json").write_text(json.dumps(data))
     assert read_certificate("c.json").late is None
@@ -743,7 +757,7 @@ def test_a_rate_is_asked_of_the_loop_with_late_messages_moving_leaders_or_a_held
         ("led.csv", "0.5", ("--leader-speed", "1"), 4),
         ("led.csv", "0.5", ("--sample-period", "0.001", "--gain-cap", "9"), 4),
     ):
-        run = ptcc("certify", graph, "--rho2", "3", "--min-rate", rate, "--no-simulation", *more)
+        run = ptcc("certify", graph, "--rho2", "3", "--min-rate", rate, *PAPER, *more)
         assert run.code == code, (graph, rate, more, run.out)
 
 

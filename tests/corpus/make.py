@@ -9,6 +9,10 @@ from __future__ import annotations
 import shlex
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ptcc_certify import Certificate
 
 HERE = Path(__file__).parent
 GRAPHS = HERE / "graphs"
@@ -25,25 +29,26 @@ def _path(word: str) -> str:
     return str(GRAPHS / word) if word.endswith(".csv") else word
 
 
-def printed(path: Path) -> str:
-    """Return what is printed of a stored certificate: its screen, and the lines of the check."""
-    from ptcc_certify import check, read_certificate
+def printed(path: Path, saved: Certificate) -> str:
+    """Return what is printed of a stored certificate, as it was read back: its screen, and the lines of the check."""
+    from ptcc_certify import check
     from ptcc_certify.cli.terminal import flagged
     from ptcc_certify.report.screen import summary_lines
 
     lines = check(path).lines()
     lines[-1] = lines[-1].split(" by ")[0]  # which packages computed it, of which versions
-    return "\n".join([*summary_lines(read_certificate(path), name=flagged), "", *lines]) + "\n"
+    return "\n".join([*summary_lines(saved, name=flagged), "", *lines]) + "\n"
 
 
 def make(name: str, arguments: list[str]) -> int:
     """Write a certificate and what is printed of it; return the exit code of the command."""
+    from ptcc_certify import read_certificate
     from ptcc_certify.cli import cli
 
     path = HERE / f"{name}.json"
     path.unlink(missing_ok=True)
     code = cli.main(["certify", *arguments, "-q", "-o", str(path)], standalone_mode=False)
-    (HERE / f"{name}.txt").write_text(f"exit code  {code}\n{printed(path)}", "utf-8")
+    (HERE / f"{name}.txt").write_text(f"exit code  {code}\n{printed(path, read_certificate(path))}", "utf-8")
     return code
 
 

@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 from fractions import Fraction
+from functools import cache
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -120,7 +121,7 @@ def test_the_input_is_spoken_of_iff_a_decay_was_proved(tmp_path: Path) -> None:
 def test_what_cannot_be_read_or_told_takes_one_line_and_bounded_memory(tmp_path: Path) -> None:
     program()
     file = tmp_path / "c.json"
-    for text in ("[" * 10**6, '{"a":[' + "1," * 10**7 + "1]}", "\x00", '{"a": 1'):
+    for text in ("[" * 10**6, '{"a":[' + "1," * (3 * 10**6) + "1]}", "\x00", '{"a": 1'):
         file.write_text(text)
         run = subprocess.run([program(), file], capture_output=True, text=True, check=False)
         assert run.returncode == 2 and run.stdout == "" and run.stderr.count("\n") == 1 and "xception" not in run.stderr
@@ -331,7 +332,9 @@ def test_reaching_times_are_verified_and_shorter_ones_are_rejected(tmp_path: Pat
         protocol = SlidingModeProtocol(**gains, mu3=mu3)
         sigma = [0, "-0.2", "0.3"]
         document = json.loads(
-            certify(edges, protocol, InitialState([1, 2, 3], sigma0=sigma), asks=Asks(simulation=False)).to_json()
+            certify(
+                edges, protocol, InitialState([1, 2, 3], sigma0=sigma), asks=Asks(simulation=False, method="paper")
+            ).to_json()
         )
         code, text = said(document, tmp_path)
         assert code == 0 and f"verified    {listed}" in text
@@ -353,7 +356,10 @@ def test_reaching_times_far_away_are_named(tmp_path: Path) -> None:
     edges = [("a", "b", 1), ("b", "a", -1)]
     document = json.loads(
         certify(
-            edges, SlidingModeProtocol(**gains), InitialState([1, 2], sigma0=[0, 1]), asks=Asks(simulation=False)
+            edges,
+            SlidingModeProtocol(**gains),
+            InitialState([1, 2], sigma0=[0, 1]),
+            asks=Asks(simulation=False, method="paper"),
         ).to_json()
     )
     far = resealed(changed(document, ("reaching_time", "z", "b"), "26"))
@@ -368,7 +374,9 @@ def test_what_the_sliding_mode_adds_to_the_input_is_verified(tmp_path: Path) -> 
     for mu3, sigma, stated in (("0.5", [0, -1, 2], True), ("0.4", [0, -1, 2], False), ("0.4", [0, 0, 0], True)):
         protocol = SlidingModeProtocol(**gains, mu3=mu3)
         document = json.loads(
-            certify(edges, protocol, InitialState(start, sigma0=sigma), asks=Asks(simulation=False)).to_json()
+            certify(
+                edges, protocol, InitialState(start, sigma0=sigma), asks=Asks(simulation=False, method="paper")
+            ).to_json()
         )
         code, text = said(document, tmp_path)
         assert code == 0 and "verified    sliding-bound of protocol" in text
@@ -426,7 +434,9 @@ def test_a_shorter_path_or_a_lower_energy_than_is_proved_is_rejected(tmp_path: P
     edges, start = [("a", "b", 1), ("b", "a", -1), ("b", "c", -2), ("c", "d", 1)], [1, 2, 3, -4]
     for protocol, sigma in ((NominalProtocol(2, 3, 1, 2), None), (SlidingModeProtocol(**gains), [0, 0, 0, 0])):
         document = json.loads(
-            certify(edges, protocol, InitialState(start, sigma0=sigma), asks=Asks(simulation=False)).to_json()
+            certify(
+                edges, protocol, InitialState(start, sigma0=sigma), asks=Asks(simulation=False, method="paper")
+            ).to_json()
         )
         code, text = said(document, tmp_path)
         assert code == 0
@@ -493,6 +503,7 @@ MOVING: dict[str, float | str] = {
 EDGES = [("a", "b", 1), ("b", "a", -1), ("b", "c", -2), ("c", "d", 1)]
 
 
+@cache
 def moving_document(**gains: float | str) -> dict[str, Any]:
     """A certificate under the sliding-mode protocol whose sliding variables move."""
     protocol = SlidingModeProtocol(**{**MOVING, **gains})

@@ -373,6 +373,7 @@ def sharper(setting: Setting) -> Any:
     return known
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", ["double integrators", "drag in the plane", "at rest", "capped gain"])
 def test_of_some_mutants_of_agents_none_is_accepted_unless_true_or_not_checked(name: str, tmp_path: Path) -> None:
     program()

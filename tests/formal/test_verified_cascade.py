@@ -262,6 +262,7 @@ def random_document(seed: int) -> Json:
     return document(graph, protocol, {"cascade": alpha, "method": method, "offsets": seed % 3 == 0}, seed % 4, seed)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("seed", [3, 14, 25, 41])
 def test_what_the_checker_accepts_of_graphs_of_some_classes_the_verified_one_accepts(seed: int, tmp_path: Path) -> None:
     program()

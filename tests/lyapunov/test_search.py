@@ -80,6 +80,7 @@ def test_the_exact_basis_lies_in_the_range_of_the_laplacian(name: str):
 # ---------------------------------------------------------------------- what the classes reach
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(("name", "kwargs"), class_cases(KINDS[::5]))
 def test_a_composite_reaches_its_slowest_block(name: str, kwargs: dict):
     """The full class at a useful prefactor, and the diagonal one against its own limit, over every row."""
@@ -97,6 +98,7 @@ def test_a_composite_reaches_its_slowest_block(name: str, kwargs: dict):
         assert max(float(m.rate) for m in found.functions) <= spectral * (1 + 1e-5), name
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("name", "at"), thinned([("1.2", "0.1"), ("2.1 K>=2", "0.7"), ("3.1 mixed", "0.95"), ("2.1 K>=2", "0.95")], 3)
 )

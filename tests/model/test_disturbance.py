@@ -98,7 +98,7 @@ ARITHMETIC = st.recursive(
 )
 
 
-@settings(deadline=None, max_examples=300)
+@settings(deadline=None, max_examples=100)
 @given(ARITHMETIC, st.integers(0, 4), st.sampled_from([0.0, 0.5, 1.25, -3.0, 7.0]))
 def test_the_grammar_is_that_of_python(tree, agent, t):
     assume(len(tree.text) <= 1000)
@@ -265,7 +265,7 @@ TEXTS = st.recursive(
 )
 
 
-@settings(deadline=None, max_examples=150)
+@settings(deadline=None, max_examples=60)
 @given(TEXTS, st.integers(0, 3), st.floats(0.1, 3), st.sampled_from([ca.SX, ca.MX]))
 def test_casadi_and_numpy_agree(text, agent, instant, symbols):
     assume(text.count("(") < 40)
@@ -288,7 +288,7 @@ def real(text, agent, t):
     return eval(exact, {"__builtins__": {}}, names)  # noqa: S307
 
 
-@settings(deadline=None, max_examples=400)
+@settings(deadline=None, max_examples=150)
 @given(TEXTS, st.integers(0, 3), st.floats(0, 10), st.floats(0, 1) | st.floats(0, 1e-9) | st.floats(0, 30))
 @example("sin(1e3*t)", 0, 0.0, 1e-3)
 @example("(t-1)**2", 0, 0.5, 1.0)

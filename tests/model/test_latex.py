@@ -190,7 +190,7 @@ EXPRESSIONS = st.recursive(
 )
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(EXPRESSIONS, st.tuples(*[st.floats(-4, 4)] * 3))
 def test_the_printed_expression_has_the_value_of_the_expression(expression, point):
     assume("nan" not in str(expression))

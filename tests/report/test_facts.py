@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,6 +21,8 @@ from ptcc_certify.report.facts.late import _within_text
 from ptcc_certify.report.facts.law import beside_law
 from ptcc_certify.report.page import set_note
 from ptcc_certify.report.screen import certificate_lines, summary_lines
+
+pytestmark = pytest.mark.usefixtures("framed_figures")
 
 CORPUS = Path(__file__).parents[1] / "corpus"
 NAMES = thinned(sorted(path.stem for path in CORPUS.glob("*.json")), 24)
@@ -99,9 +102,9 @@ def told(certificate: ptcc.Certificate, head: str) -> list[str]:
 
 def test_what_is_told_of_other_agents_or_another_law_says_so(tmp_path: Path):
     led = [("lead", "a", 1), ("a", "b", 1), ("b", "a", -1)]
-    law, asks = ptcc.NominalProtocol(), ptcc.Asks(simulation=False)
+    law, asks = ptcc.NominalProtocol(), ptcc.Asks(simulation=False, method="paper")
     moving = ptcc.certify(led, law, [1, 3, -2], leaders=ptcc.MovingLeaders("0.5", "0.2", "0.9"), asks=asks)
-    disturbed = ptcc.certify(led, law, [1, 3, -2], asks=ptcc.Asks(simulation=False, delta="0.5"))
+    disturbed = ptcc.certify(led, law, [1, 3, -2], asks=replace(asks, delta="0.5"))
     for certificate in (moving, disturbed):
         assert all("without disturbances" in told(certificate, head)[0] for head in ("claim", "x(T)"))
     assert told(moving, "given") == ["leaders at rest, without disturbances, without sign(e_k), in what follows"]

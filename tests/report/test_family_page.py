@@ -38,6 +38,14 @@ from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.switching_signals import RandomSignal
 from ptcc_certify.theorems.family_behaviour import decide
 
+
+@pytest.fixture(autouse=True)
+def words_alone(request: pytest.FixtureRequest) -> None:
+    """Figures are written out in the test of the first screen alone."""
+    if "first_screen" not in request.node.name:
+        request.getfixturevalue("framed_figures")
+
+
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
 SLIDING = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=3, mu1=2, mu2=1, mu3=1, delta=1)
 DAY = SignedDigraph.from_edges([("ann", "<b>", 1), ("<b>", "eve", -1)])

@@ -1057,6 +1057,7 @@ def test_where_sliding_variables_are_0_neither_they_nor_their_deadline_are_annou
         assert ("sliding variables over time" in trajectory_html(cert.trajectory)) == moves
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     "ends", [(1, 1 + 2**-50, 1), (0, 0, 0), (1e-320, 2e-320, 0), (-1e300, 1e300, 3), (1e300, 1e300, 1e300)]
 )

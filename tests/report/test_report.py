@@ -350,6 +350,7 @@ def test_the_page_of_capped_vehicles_does_not_say_that_their_gain_is_infinite():
     assert "The gain is infinite" not in page and "What is told without limits is of a gain that is infinite" in page
 
 
+@pytest.mark.usefixtures("framed_figures")
 def test_the_page_of_a_design_says_what_was_asked_and_of_which_states_its_bounds_are(tmp_path: Path):
     graph = SignedDigraph.from_edges([(1, 2, 3), (2, 3, -1), (3, 1, 1)])
     asked = {"max_input": 20, "initial_bound": 3, "deadline": "2.5"}
@@ -418,6 +419,7 @@ def sound_rejection(source: str) -> Page:
     return sound(source)
 
 
+@pytest.mark.usefixtures("framed_figures")
 def test_an_undecided_certificate_is_not_called_certified(tmp_path: Path):
     done = ptcc("report", str(undecided(tmp_path)), "-o", str(tmp_path / "c.html"))
     assert done.code == 4, done.err
@@ -430,6 +432,7 @@ def test_an_undecided_certificate_is_not_called_certified(tmp_path: Path):
     assert "[certified]" not in text and "[verified; the certificate is undecided]" in text and "occurs at" not in text
 
 
+@pytest.mark.usefixtures("framed_figures")
 def test_without_a_proved_rate_little_is_said(tmp_path: Path):
     example("nominal").save(tmp_path / "c.json")
     data = json.loads((tmp_path / "c.json").read_text())
@@ -454,6 +457,7 @@ def test_isolated_agents_under_the_sliding_mode_keep_the_difference(tmp_path: Pa
     assert [row[4] for row in rows((tmp_path / "c.html").read_text(), "Where the agents end")] == ["-2", "2"]
 
 
+@pytest.mark.usefixtures("framed_figures")
 def test_the_heading_names_the_sharpest_claim(tmp_path: Path):
     allies = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("b", "c", 1)])
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
@@ -593,6 +597,7 @@ def test_a_statement_fits_a_column_of_two(n: int, size: Any, sliding: bool, tmp_
     assert all(float(excess) <= 2 for excess in re.findall(r"Overfull \\hbox \(([0-9.]+)pt", log)), log
 
 
+@pytest.mark.usefixtures("framed_figures")
 @pytest.mark.parametrize("x0", thinned([[1, 2, 3], None], 2))
 def test_a_statement_tells_the_input_with_late_messages(x0: Any):
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1), ("a", "c", 2)])
@@ -604,6 +609,7 @@ def test_a_statement_tells_the_input_with_late_messages(x0: Any):
     assert told + (", from within $1$ of it at first" if x0 is None else "") + "." in text
 
 
+@pytest.mark.usefixtures("framed_figures")
 def test_the_answer_of_late_messages_tells_whose_speed_it_names():
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)])
     leaders = MovingLeaders(speed="0.5", disturbance="0.2")
@@ -647,6 +653,7 @@ def test_every_row_of_the_table_begins_with_a_label_and_not_with_an_argument(tmp
     assert after and not set(after) & set("[*")
 
 
+@pytest.mark.usefixtures("framed_figures")
 @pytest.mark.few(1)
 @pytest.mark.parametrize(
     "size", ["1e300", "0", *(pytest.param(size, marks=pytest.mark.campaign) for size in ("1e-250", "1e160"))]
@@ -660,6 +667,7 @@ def test_starts_of_any_size_are_reported(size: str, tmp_path: Path):
     assert (tmp_path / "c_decay.pdf").exists() == (size != "0")
 
 
+@pytest.mark.usefixtures("framed_figures")
 @pytest.mark.parametrize("start", [["1", "1/3", "1/3"], ["1", "1/3", "0.33333333333333333333"]])
 def test_where_agents_begin_at_their_ends_or_all_but_there_a_page_has_no_decay(start: list[str]):
     graph = SignedDigraph.from_edges([("lead", "a", 1), ("a", "b", 1), ("b", "a", -1)])
@@ -722,6 +730,7 @@ def test_a_statement_holds_hypotheses_claim_and_numbers(tmp_path: Path):
     )
 
 
+@pytest.mark.usefixtures("framed_figures")
 @pytest.mark.parametrize("sigma0", [None, [1, 0, -2, 1, 0, 3]], ids=["nominal", "sliding"])
 def test_a_statement_of_a_formation_is_that_of_states_less_places_but_for_where_agents_are(sigma0: Any):
     """Bounds are those of the statement of ``x0 - h``; the protocol and the table tell places and positions."""
@@ -763,6 +772,7 @@ def test_through_a_reaching_phase_the_statement_tells_what_is_left_from_T_r_on(t
         assert least * 0.999 <= share <= least * 1.12
 
 
+@pytest.mark.usefixtures("framed_figures")
 def test_the_bound_through_a_reaching_phase_is_called_numerical_everywhere(tmp_path: Path):
     for name, word, arithmetic in (
         ("nominal", "proved bound", "exact arithmetic"),
@@ -806,6 +816,7 @@ def test_the_page_says_in_words_why_a_bound_says_little(tmp_path: Path):
     assert "--rho2" not in page
 
 
+@pytest.mark.usefixtures("framed_figures")
 @pytest.mark.parametrize("more", [{}, {"sample_period": "0.1"}])
 def test_bounds_without_the_limits_of_the_gain_are_told_so(more: dict[str, Any], tmp_path: Path):
     limits = GainLimits(gain_cap=3, **more)
@@ -896,6 +907,7 @@ def test_the_command_writes_a_page(tmp_path: Path):
     sound((tmp_path / "c.html").read_text(encoding="utf-8"))
 
 
+@pytest.mark.usefixtures("framed_figures")
 def test_the_command_names_every_file_of_a_statement(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
     certify([("a", "b", -1), ("b", "a", -1)], NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5]).save("c.json")
@@ -910,6 +922,7 @@ _VEHICLES = {"agents": Agents(order=2, exchange="virtual")}
 _LATE, _SPEED = LateMessages("0.01"), MovingLeaders("0.3")
 
 
+@pytest.mark.usefixtures("framed_figures")
 @pytest.mark.parametrize(
     ("parts", "without"),
     [

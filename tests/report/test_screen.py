@@ -62,6 +62,7 @@ def assert_screen(certificate: ptcc.Certificate, name: str = "graph") -> list[st
     return lines
 
 
+@pytest.mark.few(5)
 @pytest.mark.parametrize("kind", thinned(KINDS))
 def test_of_every_class_the_screens_fit_8_lines_of_80_columns(kind: str):
     kwargs = dict(all_classes())[kind]

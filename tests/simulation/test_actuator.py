@@ -326,6 +326,7 @@ def test_a_disturbed_run_is_that_of_another_integrator(text, delta, function):
     assert f"disturbance {'constant' if not isinstance(text, str) else text}" in repr(run)
 
 
+@pytest.mark.few(13)
 @pytest.mark.parametrize("limits", LIMITS, ids=str)
 @pytest.mark.parametrize("noisy", [False, True])
 def test_a_disturbed_and_noisy_run_behind_limits_is_that_of_another_integrator(limits, noisy):

@@ -53,6 +53,7 @@ def signals(family):
     ]
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("family", thinned(families(), 2), ids=lambda family: f"{family.n_nodes} nodes")
 def test_a_run_is_a_product_of_exponentials_of_its_members(family):
     members, x0 = Members(family), np.random.default_rng(0).normal(size=family.n_nodes)

@@ -200,6 +200,7 @@ def test_a_rho_next_to_the_end_of_its_interval_lies_within_what_is_proved(gap: f
     assert interval is not None and interval.exact is not None and near.rho <= interval.exact < 1
 
 
+@pytest.mark.few(15)
 @pytest.mark.parametrize(("name", "kwargs"), class_cases())
 def test_the_derivative_is_the_form_of_the_proof(name: str, kwargs: dict):
     """V' by CasADi equals -gain z'(Omega A + A'Omega)z to 1e-10 and is at most the form that gives the rate."""
