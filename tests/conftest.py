@@ -20,7 +20,7 @@ from hypothesis import settings
 # A shell lets what it runs in the background ignore Ctrl-C; tests send it to themselves and to their children.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=25)
+settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=40)
 #: ``--hypothesis-profile thorough``: other examples every time, and many.
 settings.register_profile("thorough", deadline=None, max_examples=1000)
 settings.load_profile("repeatable")
