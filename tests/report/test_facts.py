@@ -187,7 +187,7 @@ def test_a_behaviour_is_not_met_where_limits_or_noise_leave_something(words: dic
     assert told(still, "verdict")[0].startswith("met: ")
 
 
-def test_messages_that_are_rounded_are_not_called_late():
+def test_messages_that_are_inexact_are_not_called_late():
     led, law, asks = (
         [("lead", "a", 1), ("a", "b", 1), ("b", "a", -1)],
         ptcc.NominalProtocol(),
@@ -200,7 +200,7 @@ def test_messages_that_are_rounded_are_not_called_late():
     for without, of in messages.items():
         rounded = ptcc.certify(led, law, [1, 2, 3], messages=of, asks=asks)
         assert f", {without} (" in told(rounded, "claim")[0]
-    assert beside_law(rounded) == ["Here messages are exact; with rounded ones what is heard is off by up to 0.1."]
+    assert beside_law(rounded) == ["Here messages are exact; with inexact ones what is heard is off by up to 0.1."]
 
 
 def test_rates_of_the_plain_protocol_are_not_those_of_agents_of_order_1_with_gains_of_their_own():
