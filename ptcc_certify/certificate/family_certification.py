@@ -143,7 +143,7 @@ def _beside(proof: FamilyProof) -> dict[str, Any]:
     known = [pair for pair in proof.final_state or () if pair is not None]
     middles = [((low + high) / 2, (high - low) / 2) for low, high in known]
     ends = middles if len(known) == proof.family.n_nodes else None
-    return {"late": bound_late(LateCase(proof.family, proof.protocol, messages, state, ends, proof.request.leaders))}
+    return {"late": bound_late(LateCase(proof.family, proof.protocol, messages, state, ends))}
 
 
 def _fewer_functions(certificate: Certificate) -> Certificate:

@@ -313,8 +313,7 @@ class GraphSteps(OfQuestion):
                     " out",
                 )
             )
-        leaders = self.request.leaders
-        return bound_late(LateCase(self.structure, self.protocol, messages, self.initial_state, ends, leaders))
+        return bound_late(LateCase(self.structure, self.protocol, messages, self.initial_state, ends))
 
 
 def _search_and_prove(

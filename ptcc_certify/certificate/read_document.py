@@ -59,7 +59,7 @@ def read_document(source: Source) -> tuple[GraphProof | FamilyProof, Observation
     request = replace(request, **read_unproved(document, subject))
     relative = state is None if isinstance(subject, Family) else sections["final_state"] is None
     late = read_late(source.report, subject, protocol, relative)
-    late = late or nothing_proved(request.messages, request.leaders, subject, protocol, state is None)
+    late = late or nothing_proved(request.messages, subject, protocol, state is None)
     words: dict[str, Any] = {
         "question": Question(subject, protocol, state, fractions(sections["sliding_variable"]), request),
         "reaching": read_reaching(sections.get("reaching_time"), protocol),

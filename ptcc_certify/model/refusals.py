@@ -170,7 +170,7 @@ def refuse_beside(structure: Structure, case: Case) -> None:
     _refuse_beside_any_graph(case)
     if messages is None and leaders is None:
         return
-    late = messages is not None and (messages.flawed or messages.vehicles is not None)
+    late = messages is not None and not messages.tracks
     _refuse_more(_NOT_LATE if late else _NOT_TRACKING, case)
     if leaders is not None:
         what = "leaders that move as they like" if leaders.speed else "disturbances where messages are late"

@@ -712,7 +712,7 @@ def test_a_file_without_anything_proved_of_moving_leaders_still_says_that_they_w
     )
     made.changed(late=replace(made.late, rows=(), residual=None, input=None)).save("c.json")
     saved = read_certificate("c.json")
-    assert saved.request.leaders == leaders and not saved.late.says_something
+    assert saved.request.messages.leaders == leaders and not saved.late.says_something
     assert "left open: leaders that move" in saved.assessment.text and int(saved.assessment.exit_code) == 4
 
 

@@ -76,8 +76,6 @@ class LateCase:
     initial_state : sequence of N Fraction, optional
     ends : sequence of N (middle, radius), optional
         Of ``Q X(0)``; without it bounds are for every initial state within 1 of its final one.
-    leaders : MovingLeaders, optional
-        Leaders move, and followers are disturbed; ``x*`` moves with the leaders. A sign term asks for messages at once.
     influence : Influence, optional
         Exact; it belongs to ``forms``.
     forms : sequence of DecayingForm
@@ -96,7 +94,6 @@ class LateCase:
     messages: LateMessages
     initial_state: Sequence[Fraction] | None = None
     ends: Sequence[tuple[Fraction, Fraction]] | None = None
-    leaders: MovingLeaders | None = None
     influence: Influence | None = None
     forms: Sequence[DecayingForm] = ()
 
@@ -115,6 +112,11 @@ class LateCase:
     def followers(self) -> np.ndarray:
         """The agents that hear others, ascending; of a graph that has leaders in groups, others than these."""
         return self.structure.followers if isinstance(self.structure, Structure) else listeners(self.structure)
+
+    @property
+    def leaders(self) -> MovingLeaders | None:
+        """How leaders move, and what disturbs followers; ``x*`` moves with the leaders. None of leaders at rest."""
+        return self.messages.leaders
 
     @property
     def relative(self) -> bool:
