@@ -39,6 +39,7 @@ from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.lyapunov.late_follower_rows import FollowerRows
 from ptcc_certify.model import NominalProtocol
 from ptcc_certify.model.asks import Asks, Expectations
+from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.simulation.late_messages import PATTERNS, simulate_late
@@ -883,3 +884,23 @@ def test_what_inexact_values_add_is_proved_where_weights_cancel() -> None:
         asks=Asks(simulation=False, method="paper"),
     )
     assert certificate.verdict == "certified" and certificate.checked.accepted
+
+
+@pytest.mark.parametrize("limits", [GainLimits(), (GainLimits(gain_cap=9), GainLimits())])
+@pytest.mark.parametrize("beside", [{"messages": LateMessages("0.01")}, {"leaders": MovingLeaders(speed=1)}])
+def test_limits_that_limit_nothing_are_refused_beside_messages_too(limits: Any, beside: dict[str, Any]) -> None:
+    chain = SignedDigraph.from_edges([(1, 2, 1)])
+    with pytest.raises(ParameterError, match="limit nothing|two; give both|one gain cap alone"):
+        certify(chain, NominalProtocol(), limits=limits, **beside)
+
+
+def test_leaders_are_told_by_messages_or_beside_them() -> None:
+    chain, leaders = SignedDigraph.from_edges([(1, 2, 1)]), MovingLeaders(speed=1)
+    asks, messages = Asks(simulation=False, method="paper"), LateMessages("0.01", leaders=leaders)
+    made = certify(chain, NominalProtocol(), messages=messages, asks=asks)
+    beside = certify(chain, NominalProtocol(), messages=LateMessages("0.01"), leaders=leaders, asks=asks)
+    assert (
+        made.late is not None and made.late.leaders == leaders and made.document["digest"] == beside.document["digest"]
+    )
+    with pytest.raises(ParameterError, match="given twice"):
+        certify(chain, NominalProtocol(), messages=messages, leaders=MovingLeaders(speed=2))
