@@ -77,9 +77,7 @@ class Case:
                 raise ParameterError(name, f"= {shorten(repr(value))} is none; {mend}")
         if self.messages is not None and self.messages.leaders not in (None, self.leaders):
             if self.leaders is not None:
-                raise ParameterError(
-                    "leaders", "is given twice, beside the messages and by them; leave one of them out"
-                )
+                raise ParameterError("leaders", "is given twice, beside the messages and by them; leave one out")
             object.__setattr__(self, "leaders", self.messages.leaders)
         for entry in limits:
             if not isinstance(entry, Limits):
