@@ -890,7 +890,7 @@ def test_what_inexact_values_add_is_proved_where_weights_cancel() -> None:
 @pytest.mark.parametrize("beside", [{"messages": LateMessages("0.01")}, {"leaders": MovingLeaders(speed=1)}])
 def test_limits_that_limit_nothing_are_refused_beside_messages_too(limits: Any, beside: dict[str, Any]) -> None:
     chain = SignedDigraph.from_edges([(1, 2, 1)])
-    with pytest.raises(ParameterError, match="limit nothing|two; give both|one gain cap alone"):
+    with pytest.raises(ParameterError, match=r"limit nothing|two; give both|one gain cap alone"):
         certify(chain, NominalProtocol(), limits=limits, **beside)
 
 
