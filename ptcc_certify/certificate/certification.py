@@ -7,6 +7,7 @@ the check; a simulation corroborates and never proves.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -23,9 +24,8 @@ from ptcc_certify.certificate.graph_certification import (
     STEPS,
     GraphSteps,
     with_agents,
-    with_small_delays,
-    with_word_of_check,
 )
+from ptcc_certify.certificate.messages_part import with_messages
 from ptcc_certify.certificate.request import (
     Question,
     listener,
@@ -196,20 +196,36 @@ def certify_case(
     x0 = None if chains else case.initial.x0
     state = None if x0 is None else read_initial_state(structure, x0, "x0")
     manifold, reaching = read_sliding_variable(structure, case.protocol, case.initial.sigma0)
+    if case.messages is not None and any(manifold or ()):
+        raise ParameterError("sigma0", "late messages ask for 0, so that no sliding variable moves; leave it out")
     question = Question(structure if family is None else family, case.protocol, state, manifold, request)
     with one_thread(graph.n_nodes <= ONE_THREAD_NODES):
         if family is not None:
-            return certify_family(family, question, reaching, progress)
-        steps = GraphSteps(structure, question, progress)
-        wanted = steps.needs_run(case.asks.simulation)
-        certificate = steps.certificate(case.asks.disturbance, wanted and state is not None, reaching)
-        if formation is not None:
-            certificate = certificate.changed(offsets=formation.offsets)
-        if agents is not None and chains is not None:
-            certificate = with_agents(certificate, agents, chains, wanted)
-        certificate = with_small_delays(certificate)
+            certificate = certify_family(family, question, reaching, progress)
+        else:
+            steps = GraphSteps(structure, question, progress)
+            wanted = steps.needs_run(case.asks.simulation)
+            certificate = steps.certificate(case.asks.disturbance, wanted and state is not None, reaching)
+            if formation is not None:
+                certificate = certificate.changed(offsets=formation.offsets)
+            if agents is not None and chains is not None:
+                certificate = with_agents(certificate, agents, chains, wanted)
+        certificate = with_messages(certificate)
         progress(STEPS[5])
         return with_word_of_check(certificate)
+
+
+def with_word_of_check(certificate: Certificate) -> Certificate:
+    """Check a certificate, and note what the check has to say besides."""
+    if (report := certificate.checked) is None:
+        return certificate  # nothing is decided that a file could hold
+    if report.accepted and report.memory > 1:
+        note = f"the check of this certificate needs more than 1 GB: allow {math.ceil(report.memory)} GB of memory"
+        return certificate.changed(notes=(*certificate.observed.notes, note))
+    if not report.accepted:
+        note = f"the independent check does not accept {report.rejected}: {report.reason}"
+        return certificate.changed(notes=(note, *certificate.observed.notes))
+    return certificate
 
 
 def _read_family(case: Case) -> Family | None:

@@ -8,15 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 
 from lmi import search_time as deadline
 from lmi.exact.decimal_rounding import counted
 from lmi.search_time import share_of_time
-from ptcc_certify.bounds.delay.case import LateCase
-from ptcc_certify.bounds.delay.late_messages import bound_late
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.bounds.final_state.attracting_box import AttractingBox, box_of_family
 from ptcc_certify.bounds.final_state.kept_means import with_means
@@ -98,12 +95,6 @@ def certify_family(
     progress : callable
         Is told each of :data:`STEPS` as it begins.
 
-    Raises
-    ------
-    ParameterError
-        Sliding variables move where messages are late, or leaders move.
-    HypothesisError
-        Where followers are drawn to depends on the signal, or leaders hear somebody in some mode, in such a case.
     """
     progress(STEPS[0])
     components, request = decide(family), question.request
@@ -126,24 +117,8 @@ def certify_family(
                 request.signal, parts, question.protocol, begin, notes, request.expectations.min_rate
             ),
         )
-    progress(STEPS[-1])
     notes = [f"{note}: cut off by the time limit" if note in (*STEPS, BOXES) else note for note in notes]
-    certificate = _fewer_functions(Certificate(proof, Observations(notes=tuple(dict.fromkeys(notes)))))
-    beside = _beside(certificate.family_proof)
-    return certificate.changed(**beside) if beside else certificate
-
-
-def _beside(proof: FamilyProof) -> dict[str, Any]:
-    """Return what is proved for every signal where messages are late, or leaders move."""
-    messages, state = proof.request.messages, proof.initial_state
-    if messages is None:
-        return {}
-    if not proof.direct:
-        raise ParameterError("sigma0", "late messages ask for 0, so that no sliding variable moves; leave it out")
-    known = [pair for pair in proof.final_state or () if pair is not None]
-    middles = [((low + high) / 2, (high - low) / 2) for low, high in known]
-    ends = middles if len(known) == proof.family.n_nodes else None
-    return {"late": bound_late(LateCase(proof.family, proof.protocol, messages, state, ends))}
+    return _fewer_functions(Certificate(proof, Observations(notes=tuple(dict.fromkeys(notes)))))
 
 
 def _fewer_functions(certificate: Certificate) -> Certificate:
@@ -151,20 +126,21 @@ def _fewer_functions(certificate: Certificate) -> Certificate:
 
     Claims for restricted signals that rest on a function left out are left out with it.
     """
-    parts = certificate.family_proof.parts
+    proof = certificate.family_proof
+    parts = proof.parts
     functions = [(part, V) for part in parts for V in part.functions if isinstance(V, FamilyFunction)]
     work = sum((len(V.nodes) + len(tau)) ** 3 for _, V in functions for tau in V.multipliers)
     few = sum(len(part.functions) for part in parts) <= MANY_FUNCTIONS
-    if (few and work <= LARGEST_ROWS**3) or not certificate.proof.checkable:
+    if (few and work <= LARGEST_ROWS**3) or not proof.checkable:
         return certificate
     for most in (1, 0):
         report = certificate.checked
         if report is None or report.accepted:
             break
         note = f"the independent check does not take all functions that were found: {report.reason}"
-        claims = certificate.family_proof.restricted
+        claims = proof.restricted
         certificate = certificate.changed(
-            parts=tuple(replace(part, functions=part.functions[:most]) for part in certificate.family_proof.parts),
+            parts=tuple(replace(part, functions=part.functions[:most]) for part in parts),
             restricted=tuple(c for c in claims if most or not (isinstance(c, RateClaim) and c.forms is None)),
             notes=tuple(dict.fromkeys((*certificate.observed.notes, note))),
         )
