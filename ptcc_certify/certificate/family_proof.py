@@ -48,10 +48,10 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.structure import STABILITY
-from ptcc_certify.lyapunov.family_function import FamilyFunction
-from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound
+from ptcc_certify.lyapunov.common_forms import CommonForm
 from ptcc_certify.lyapunov.follower_function import FollowerFunction
 from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.slow_signals import SignalRateBound
 from ptcc_certify.lyapunov.squares_function import SquaresFunction
 from ptcc_certify.model.constrained_switching import SignalClass
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
@@ -65,15 +65,15 @@ class ComponentProof:
     Attributes
     ----------
     component : FamilyComponent
-    functions : tuple of FamilyFunction, FollowerFunction or SquaresFunction
+    functions : tuple of CommonForm, FollowerFunction or SquaresFunction
         Proved, the largest rate first; nodes are numbered within the component.
-    upper_bound : FamilyRateBound or None
+    upper_bound : SignalRateBound or None
         No rate for every signal is larger.
     """
 
     component: FamilyComponent
     functions: tuple[ProvedFunction, ...] = ()
-    upper_bound: FamilyRateBound | None = None
+    upper_bound: SignalRateBound | None = None
 
     @property
     def rate(self) -> Fraction | None:
@@ -119,7 +119,7 @@ class BoundFunction:
     """A function of a component as the formulas of the bounds take it: by nodes of the component."""
 
     quotient: Quotient
-    function: FamilyFunction
+    function: CommonForm
 
     @property
     def rate(self) -> Fraction:
@@ -348,7 +348,7 @@ class FamilyProof(Proof):
         """The functions of every part, as the formulas of the bounds take them."""
         return tuple(
             tuple(
-                BoundFunction(Quotient.of(part.component), V) if isinstance(V, FamilyFunction) else V
+                BoundFunction(Quotient.of(part.component), V) if isinstance(V, CommonForm) else V
                 for V in part.functions
             )
             for part in self.parts

@@ -28,12 +28,12 @@ from ptcc_certify.checker.theorem_function import BlockSection, PaperSection, Rh
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends
-from ptcc_certify.lyapunov.family_rows import FollowerDecay
+from ptcc_certify.lyapunov.common_forms import CommonForm, prove_ends
 from ptcc_certify.lyapunov.follower_function import FollowerFunction, LeadingPart
 from ptcc_certify.lyapunov.function import DeviationBound, Dominance, LyapunovBlock, LyapunovFunction
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.rate_upper_bound import RateBound
+from ptcc_certify.lyapunov.row_decay import FollowerDecay
 from ptcc_certify.lyapunov.squares_function import FormTable, SquaresFunction
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
 from ptcc_certify.theorems.theorem import Obligation
@@ -52,13 +52,13 @@ def function_section(
     if isinstance(V, SquaresFunction):
         return SquaresSection(class_="squares", component=number, vector=V.vector, rate=V.rate)
     nodes = component.nodes
-    if isinstance(V, FamilyFunction):
+    if isinstance(V, CommonForm):
         return _form(nodes, component.family.labels, number, V)
     parts = [_part(nodes, component.family.labels, number, part) for part in V.parts]
     return RowsSection(class_="rows", component=number, vector=_vector(V.vector, out), parts=parts, rate=V.rate)
 
 
-def _form(nodes: np.ndarray, labels: Sequence[str], number: int, V: FamilyFunction) -> FormSection:
+def _form(nodes: np.ndarray, labels: Sequence[str], number: int, V: CommonForm) -> FormSection:
     """Return a quadratic form of some agents, which have these places and labels."""
     kind: Any = V.kind
     return FormSection(
@@ -120,7 +120,7 @@ def read_box(entry: attracting_boxes.AttractingBox, labels: Sequence[str], files
 
 def function_steps(of: str, V: ProvedFunction, out: Writer) -> Iterator[Obligation]:
     """Yield the obligations of a Lyapunov function: of its modes, or of its parts, then of its rows."""
-    if isinstance(V, FamilyFunction):
+    if isinstance(V, CommonForm):
         for mode, rate in enumerate(V.rates):
             witness = Multipliers(multipliers=V.multipliers[mode] if V.multipliers else ())
             told = None if V.kind == "undirected" else witness
@@ -153,13 +153,13 @@ def read_function(
     return _read_form(of, section, component.family.labels, proved)
 
 
-def _read_form(of: str, section: FormSection, labels: Sequence[str], proved: Proved) -> FamilyFunction:
+def _read_form(of: str, section: FormSection, labels: Sequence[str], proved: Proved) -> CommonForm:
     index = {label: v for v, label in enumerate(labels)}
     nodes, matrix = tuple(index[label] for label in section.nodes), list(map(list, section.lower_triangle))
     steps = rates_of(of, proved)
     ends = prove_ends(matrix)
     assert ends is not None, "the check has proved it definite"
-    return FamilyFunction(
+    return CommonForm(
         section.class_,
         tuple(v for v in range(len(labels)) if v not in set(nodes)),
         nodes,
@@ -341,4 +341,4 @@ def factor_section(factor: SparseFactor, power: int, parents: np.ndarray | None 
     )
 
 
-ProvedFunction = FamilyFunction | FollowerFunction | SquaresFunction
+ProvedFunction = CommonForm | FollowerFunction | SquaresFunction

@@ -14,7 +14,7 @@ from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_proof import BoundFunction
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.lyapunov.family_function import FamilyFunction
+from ptcc_certify.lyapunov.common_forms import CommonForm
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.simulation.member_laplacians import Members
 from ptcc_certify.simulation.switching_signals import WorstCaseSignal
@@ -146,10 +146,10 @@ def worst_case_signals(certificate: Certificate, step: float | None = None) -> l
     return [*against, WorstCaseSignal(step=step)]
 
 
-def functions_of(certificate: Certificate) -> Iterator[tuple[np.ndarray, Quotient, FamilyFunction]]:
+def functions_of(certificate: Certificate) -> Iterator[tuple[np.ndarray, Quotient, CommonForm]]:
     """Yield every quadratic Lyapunov function with the nodes of its component and the coordinates it is in."""
     for part in certificate.family_proof.parts:
-        quadratic = [V for V in part.functions if isinstance(V, FamilyFunction)]
+        quadratic = [V for V in part.functions if isinstance(V, CommonForm)]
         quotient = Quotient.of(part.component) if quadratic else None
         for V in quadratic:
             assert quotient is not None
@@ -240,14 +240,14 @@ def _driven_ratios(certificate: Certificate, run: Trajectory, floor: float) -> I
     y = (run.states - run.sliding.sigma)[:, before]
     for number, part in enumerate(proof.parts):
         for V, own in zip(part.functions, proof.bound_functions[number], strict=True):
-            if isinstance(V, FamilyFunction) and isinstance(own, BoundFunction) and V.rate > 0:
+            if isinstance(V, CommonForm) and isinstance(own, BoundFunction) and V.rate > 0:
                 root, size = _roots(part.component.nodes, own.quotient, V, y, floor)
                 bound = proof.norm_bound(own, number, run.remaining[before])
                 yield _worst(root - size, bound) or 0.0
 
 
 def _roots(
-    nodes: np.ndarray, quotient: Quotient, V: FamilyFunction, x: np.ndarray, floor: float
+    nodes: np.ndarray, quotient: Quotient, V: CommonForm, x: np.ndarray, floor: float
 ) -> tuple[np.ndarray, float]:
     """Return ``sqrt(V)`` of states, and what an error of the floor in every one of them makes of it."""
     signal = WorstCaseSignal.against(V, quotient, nodes, len(x))
@@ -258,7 +258,7 @@ def _roots(
 
 
 def _lyapunov_ratios(
-    nodes: np.ndarray, quotient: Quotient, V: FamilyFunction, run: Trajectory, floor: float
+    nodes: np.ndarray, quotient: Quotient, V: CommonForm, run: Trajectory, floor: float
 ) -> tuple[float, float]:
     """Return the worst ratios of ``sqrt(V)`` to its bounds by one rate, and by those of the modes."""
     root, size = _roots(nodes, quotient, V, run.states[:, np.isfinite(run.clock)], floor)

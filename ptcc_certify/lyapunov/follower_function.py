@@ -37,11 +37,11 @@ from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.structure import weak_components
-from ptcc_certify.lyapunov.family_function import FamilyFunction
-from ptcc_certify.lyapunov.family_rows import FollowerDecay, follower_decays, follower_nodes
-from ptcc_certify.lyapunov.family_search import search_family
+from ptcc_certify.lyapunov.common_form_search import search_common_forms
+from ptcc_certify.lyapunov.common_forms import CommonForm
 from ptcc_certify.lyapunov.interval_rows import IntervalRows, least_quotient
 from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.row_decay import FollowerDecay, follower_decays, follower_nodes
 from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
 from ptcc_certify.theorems.family_kernel import UNKNOWN, Kernel, TooLarge
 
@@ -66,14 +66,14 @@ class LeadingPart:
         In the component, ascending. Nobody outside is heard.
     quotient : Quotient
         Of the family on them; its nodes are numbered within them.
-    function : FamilyFunction
+    function : CommonForm
     times : Fraction
         ``t``.
     """
 
     agents: np.ndarray
     quotient: Quotient
-    function: FamilyFunction
+    function: CommonForm
     times: Fraction
 
     @property
@@ -242,7 +242,7 @@ def _leading_parts(family: Family, followers: np.ndarray) -> list[LeadingPart] |
             quotient = Quotient.of(component)
         except (HypothesisError, TooLarge):
             return None
-        functions = search_family(quotient).functions
+        functions = search_common_forms(quotient).functions
         if not functions or functions[0].rate <= 0:
             return None
         parts.append(LeadingPart(rest[own], quotient, functions[0], Fraction(1)))

@@ -26,7 +26,7 @@ from ptcc_certify.simulation.member_laplacians import MIDDLE, Choice, Members
 from ptcc_certify.theorems.family_behaviour import decide
 
 if TYPE_CHECKING:
-    from ptcc_certify.lyapunov.family_function import FamilyFunction
+    from ptcc_certify.lyapunov.common_forms import CommonForm
     from ptcc_certify.lyapunov.quotient import Quotient
 
 #: How random weights lie in their intervals.
@@ -332,13 +332,13 @@ class WorstCaseSignal(Signal):
 
     @classmethod
     def against(
-        cls, function: FamilyFunction, quotient: Quotient, nodes: np.ndarray, n: int, step: float | None = None
+        cls, function: CommonForm, quotient: Quotient, nodes: np.ndarray, n: int, step: float | None = None
     ) -> WorstCaseSignal:
         """Return the search against a Lyapunov function of a component.
 
         Parameters
         ----------
-        function : FamilyFunction
+        function : CommonForm
         quotient : Quotient
             Of the component.
         nodes : (m,) int array

@@ -26,7 +26,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.lyapunov.family_function import MARGIN, FamilyFunction, mean_constant, rounded_up
+from ptcc_certify.lyapunov.common_forms import MARGIN, CommonForm, mean_constant, rounded_up
 from ptcc_certify.lyapunov.interval_rows import IntervalRows
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
@@ -136,16 +136,16 @@ def mean_of_shares(component: FamilyComponent, shares: Sequence[Fraction]) -> Le
     return LeadingGroup(tuple(nodes.tolist()), tuple(component.gauge.tolist()), tuple(whole.tolist()))
 
 
-def with_means(function: FamilyFunction, quotient: Quotient, groups: Sequence[LeadingGroup]) -> FamilyFunction:
+def with_means(function: CommonForm, quotient: Quotient, groups: Sequence[LeadingGroup]) -> CommonForm:
     """Add to a function of positive rate a weighted mean of each leading group that keeps none exactly.
 
     Examples
     --------
-    >>> from ptcc_certify.lyapunov.family_search import search_family
+    >>> from ptcc_certify.lyapunov.common_form_search import search_common_forms
     >>> from ptcc_certify.theorems.family_behaviour import decide
     >>> (component,) = decide(Family.from_intervals([("a", "b", 9, 11), ("b", "a", 9, 11)]))
     >>> quotient = Quotient.of(component)
-    >>> V = with_means(search_family(quotient).functions[0], quotient, leading_groups(component))
+    >>> V = with_means(search_common_forms(quotient).functions[0], quotient, leading_groups(component))
     >>> [str(p) for p in V.means[0][0]]
     ['1/2', '1/2']
     """

@@ -31,7 +31,7 @@ _NEARLY_ZERO = (1e-9, 1e-7, 1e-5)
 
 
 @dataclass(frozen=True, eq=False)
-class FamilyFunction:
+class CommonForm:
     """``V = xi' P xi`` of a family in its quotient coordinates; for every signal ``V <= e^(-rate s) V(0)``.
 
     More closely ``V(s) <= V(0) e^(-sum_i rates_i s_i)``, where the signal spends the part ``s_i`` of the clock in mode
@@ -197,8 +197,8 @@ def prove_ends(P: Matrix) -> tuple[Fraction, Fraction] | None:
 # ---------------------------------------------------------------------- constants
 
 
-def with_constants(function: FamilyFunction, quotient: Quotient) -> FamilyFunction:
-    """Add the constants of inputs and coordinates; see :class:`FamilyFunction`.
+def with_constants(function: CommonForm, quotient: Quotient) -> CommonForm:
+    """Add the constants of inputs and coordinates; see :class:`CommonForm`.
 
     With ``y`` the row ``k`` of ``L_0 C^r`` and ``|z| = sqrt(z' P^-1 z)``, every member has
     ``|(L X)_k| <= (|y| + sum_e radius_e |effect_ek| |h_e|) sqrt(V)``.
@@ -233,7 +233,7 @@ def with_constants(function: FamilyFunction, quotient: Quotient) -> FamilyFuncti
     )
 
 
-def mean_constant(function: FamilyFunction, quotient: Quotient, q: Sequence[Fraction]) -> Fraction | None:
+def mean_constant(function: CommonForm, quotient: Quotient, q: Sequence[Fraction]) -> Fraction | None:
     """Return a constant with ``|q' L X|^2 <= constant V`` for every member; None if ``P > 0`` is not proved.
 
     With ``|z| = sqrt(z' P^-1 z)``, ``|q' L X| <= (|q' L_0 C^r| + sum_e radius_e |q' effect_e| |h_e|) sqrt(V)``.
