@@ -203,12 +203,8 @@ def _with_means(part: ComponentProof) -> ComponentProof:
     """Add weighted means to the functions, where groups of leaders keep none exactly."""
     if all(group.vector is not None for group in part.leading_groups):
         return part
-    forms = {k: V for k, V in enumerate(part.functions) if isinstance(V, CommonForm)}
-    quotient = Quotient.of(part.component) if forms else None
-    functions = list(part.functions)
-    for k, V in forms.items():
-        assert quotient is not None
-        functions[k] = with_means(V, quotient, part.leading_groups)
+    groups = part.leading_groups
+    functions = (with_means(V, groups) if isinstance(V, CommonForm) else V for V in part.functions)
     return replace(part, functions=tuple(functions))
 
 

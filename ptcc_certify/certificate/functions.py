@@ -28,7 +28,7 @@ from ptcc_certify.checker.theorem_function import BlockSection, PaperSection, Rh
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.lyapunov.common_forms import CommonForm, prove_ends
+from ptcc_certify.lyapunov.common_forms import CommonForm, prove_ends, weighted_mean
 from ptcc_certify.lyapunov.follower_function import FollowerFunction, LeadingPart
 from ptcc_certify.lyapunov.function import DeviationBound, Dominance, LyapunovBlock, LyapunovFunction
 from ptcc_certify.lyapunov.quotient import Quotient
@@ -70,8 +70,8 @@ def _form(nodes: np.ndarray, labels: Sequence[str], number: int, V: CommonForm) 
         inputs=dict(zip(labels, V.input_constants, strict=True)),
         coordinates=dict(zip([labels[v] for v in V.nodes], V.coordinate_constants, strict=True)),
         means=[
-            MeanSection(weights={label: w for label, w in zip(labels, q, strict=True) if w}, constant=constant)
-            for q, constant in V.means
+            MeanSection(weights={labels[v]: w for v, w in mean.weights.items()}, constant=mean.constant)
+            for mean in V.means
         ],
     )
 
@@ -150,19 +150,18 @@ def read_function(
         return SquaresFunction(dict(enumerate(own)), scale, section.rate, tables)
     if isinstance(section, RowsSection):
         return _read_rows(of, section, component, proved, files)
-    return _read_form(of, section, component.family.labels, proved)
+    return _read_form(of, section, Quotient.of(component), proved)
 
 
-def _read_form(of: str, section: FormSection, labels: Sequence[str], proved: Proved) -> CommonForm:
-    index = {label: v for v, label in enumerate(labels)}
-    nodes, matrix = tuple(index[label] for label in section.nodes), list(map(list, section.lower_triangle))
+def _read_form(of: str, section: FormSection, quotient: Quotient, proved: Proved) -> CommonForm:
+    index = {label: v for v, label in enumerate(quotient.family.labels)}
+    matrix = list(map(list, section.lower_triangle))
     steps = rates_of(of, proved)
     ends = prove_ends(matrix)
     assert ends is not None, "the check has proved it definite"
     return CommonForm(
         section.class_,
-        tuple(v for v in range(len(labels)) if v not in set(nodes)),
-        nodes,
+        quotient,
         matrix,
         tuple(step["b"] for step in steps),
         tuple(tuple(step["witness"].multipliers) for step in steps if step["witness"] is not None),
@@ -170,7 +169,8 @@ def _read_form(of: str, section: FormSection, labels: Sequence[str], proved: Pro
         input_constants=tuple(section.inputs.values()),
         coordinate_constants=tuple(section.coordinates.values()),
         means=tuple(
-            (tuple(mean.weights.get(label, Fraction(0)) for label in labels), mean.constant) for mean in section.means
+            weighted_mean(quotient, {index[label]: w for label, w in mean.weights.items()}, mean.constant)
+            for mean in section.means
         ),
     )
 
@@ -197,8 +197,8 @@ def _read_rows(
     ends, parts = dict.fromkeys(outside, 0), []
     for j, (some, part) in enumerate(zip(agents, section.parts, strict=True)):
         own = family.restricted(some)
-        function = _read_form(f"{of}.parts[{j}]", part.function, own.labels, proved)
-        parts.append(LeadingPart(some, Quotient(own), function, part.times * scale))
+        function = _read_form(f"{of}.parts[{j}]", part.function, Quotient(own), proved)
+        parts.append(LeadingPart(some, function, part.times * scale))
         bounds = zip(some.tolist(), part.bounds, strict=True)
         ends |= {v: ceil(bound * scale) for v, bound in bounds if v not in pivots}
     vectors = np.array(d, dtype=object), np.array(list(ends.values()), dtype=object)

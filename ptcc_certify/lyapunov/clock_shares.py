@@ -71,7 +71,7 @@ def search_share_form(
     if component.nodes.size > EXACT_NODES:
         return None
     try:
-        quotient = Quotient(component.family)
+        quotient = Quotient(component.family, component.kernel)
     except HypothesisError:
         return None
     camps = len(quotient.pivots) == 1 and component.gauge is not None

@@ -230,12 +230,11 @@ def prove_certificate(
         rates[number] = rate
     function = CommonForm(
         kind,
-        quotient.pivots,
-        quotient.nodes,
+        quotient,
         matrix,
         tuple(rates),
         tuple(multipliers),
         *ends,
         numerical_rate=certificate.rate,
     )
-    return with_constants(function, quotient)
+    return with_constants(function)

@@ -71,8 +71,7 @@ def undirected_function(quotient: Quotient) -> CommonForm | None:
     optimal = symmetric[min(moving, key=lambda i: rates[i])]
     function = CommonForm(
         "undirected",
-        quotient.pivots,
-        quotient.nodes,
+        quotient,
         P,
         tuple(rates),
         ((),) * len(rates),
@@ -81,7 +80,7 @@ def undirected_function(quotient: Quotient) -> CommonForm | None:
         optimal=optimal,
         numerical_rate=min(numerical),
     )
-    return with_constants(function, quotient)
+    return with_constants(function)
 
 
 def common_left_vector(family: Family) -> Vector | None:

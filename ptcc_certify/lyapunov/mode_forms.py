@@ -70,7 +70,7 @@ def within_reach(quotient: Quotient) -> bool:
     return 0 < rows <= ROWS and modes <= MODES and rows * modes <= ALL_ROWS
 
 
-def mode_functions(quotient: Quotient, forms: ModeForms) -> list[tuple[Quotient, CommonForm]]:
+def mode_functions(quotient: Quotient, forms: ModeForms) -> list[CommonForm]:
     """Return the form of each mode as a function of this mode alone, with the constants of its inputs.
 
     Examples
@@ -78,7 +78,7 @@ def mode_functions(quotient: Quotient, forms: ModeForms) -> list[tuple[Quotient,
     >>> from ptcc_certify.graphs.family import Family
     >>> day, night = SignedDigraph.from_edges([("a", "b", 3)]), SignedDigraph.from_edges([("a", "b", 1)])
     >>> quotient = Quotient(Family.switching([day, night]))
-    >>> [round(float(V.rate), 3) for _, V in mode_functions(quotient, search_single_forms(quotient))]
+    >>> [round(float(V.rate), 3) for V in mode_functions(quotient, search_single_forms(quotient))]
     [6.0, 2.0]
     """
     result = []
@@ -86,8 +86,7 @@ def mode_functions(quotient: Quotient, forms: ModeForms) -> list[tuple[Quotient,
     for mode, matrix, rate, multipliers in parts:
         alone, ends = Quotient(Family((mode,)), quotient.kernel), prove_ends(matrix)
         assert ends is not None, "the forms are proved definite"
-        V = CommonForm("full", quotient.pivots, quotient.nodes, matrix, (rate,), (multipliers,), *ends)
-        result.append((alone, with_constants(V, alone)))
+        result.append(with_constants(CommonForm("full", alone, matrix, (rate,), (multipliers,), *ends)))
     return result
 
 

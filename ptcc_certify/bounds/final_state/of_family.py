@@ -365,7 +365,7 @@ def weighted_mean_interval(
     if sum(p, Fraction(0)) != 1:
         raise HypothesisError("the sum of the weights is not 1")
     signed = [weight * camp for weight, camp in zip(p, camps, strict=True)]
-    constant = mean_constant(function, quotient, signed)
+    constant = mean_constant(function, dict(enumerate(signed)))
     if constant is None:
         raise HypothesisError("the matrix of the function is not proved definite")
     mean = sum((s * y for s, y in zip(signed, x, strict=True)), Fraction(0))
