@@ -44,7 +44,7 @@ from ptcc_certify.graphs.size_limits import (
     ONE_THREAD_NODES,
 )
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.lyapunov.late_follower_rows import refuse_other_targets
+from ptcc_certify.lyapunov.follower_rows import refuse_other_targets
 from ptcc_certify.model import Protocol
 from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.asks import Asks

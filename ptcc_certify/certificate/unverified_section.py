@@ -31,9 +31,9 @@ from ptcc_certify.errors import one_line
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure, behaviour_name
-from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound, Member, prove_again
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.search import METHODS
+from ptcc_certify.lyapunov.slow_signals import Member, SignalRateBound, prove_again
 from ptcc_certify.model.base import Protocol
 from ptcc_certify.model.constrained_switching import SignalClass
 from ptcc_certify.model.late_messages import LateMessages
@@ -43,7 +43,7 @@ from ptcc_certify.theorems.counterexample_text import mode_name
 _MANY = 100
 
 
-def upper_bound_entry(quotient: Quotient, bound: FamilyRateBound) -> dict[str, Any]:
+def upper_bound_entry(quotient: Quotient, bound: SignalRateBound) -> dict[str, Any]:
     """Return a bound as JSON-ready data.
 
     Each member has its mode and the weights of its uncertain edges as ``[source, target, weight]``; those that change
@@ -52,9 +52,9 @@ def upper_bound_entry(quotient: Quotient, bound: FamilyRateBound) -> dict[str, A
 
     Examples
     --------
-    >>> from ptcc_certify.lyapunov.family_rate_upper_bound import prove_family_rate_bound
+    >>> from ptcc_certify.lyapunov.slow_signals import prove_signal_rate_bound
     >>> quotient = Quotient(Family.from_intervals([("a", "b", 1, 2)]))
-    >>> upper_bound_entry(quotient, prove_family_rate_bound(quotient))["members"]
+    >>> upper_bound_entry(quotient, prove_signal_rate_bound(quotient))["members"]
     [{'mode': 0, 'name': 'the graph', 'weights': [['a', 'b', '1']]}]
     """
     members = [
@@ -75,7 +75,7 @@ def _weights(quotient: Quotient, member: Member) -> list[list[str]]:
     return weights
 
 
-def read_upper_bound(quotient: Quotient, entry: Any) -> FamilyRateBound | None:
+def read_upper_bound(quotient: Quotient, entry: Any) -> SignalRateBound | None:
     """Return a bound that the file states, proved anew from its members; None if it is none, or not proved.
 
     Examples

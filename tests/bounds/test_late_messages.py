@@ -36,7 +36,7 @@ from ptcc_certify.checker.late_input import gain_above
 from ptcc_certify.errors import HypothesisError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure, analyse
-from ptcc_certify.lyapunov.late_follower_rows import FollowerRows
+from ptcc_certify.lyapunov.follower_rows import FollowerRows
 from ptcc_certify.model import NominalProtocol
 from ptcc_certify.model.asks import Asks, Expectations
 from ptcc_certify.model.gain_limits import GainLimits

@@ -680,7 +680,7 @@ def test_what_the_time_limit_cut_off_of_a_family_is_a_sentence(monkeypatch: pyte
     def late(*_: object) -> None:
         raise OutOfTime("late")
 
-    monkeypatch.setattr(family_certification, "prove_family_rate_bound", late)
+    monkeypatch.setattr(family_certification, "prove_signal_rate_bound", late)
     assert "note       upper bound on the decay rate: cut off by the time limit" in ptcc("certify", *BOTH, "-v").out
 
 
