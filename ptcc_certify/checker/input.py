@@ -17,7 +17,16 @@ from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.final_state import FinalState
 from ptcc_certify.checker.lyapunov import Function
-from ptcc_certify.checker.matrix_products import Matrix, block, congruence, decrease, less, need_rows, only
+from ptcc_certify.checker.matrix_products import (
+    Matrix,
+    block,
+    congruence,
+    decrease,
+    first_unbounded,
+    less,
+    need_rows,
+    only,
+)
 from ptcc_certify.checker.protocol import Begin, Protocol, SlidingPart, check_sliding_part, sliding_part
 from ptcc_certify.checker.reading import RejectedError, length, need
 from ptcc_certify.checker.section_declarations import ByAgent, FewAgents, Positive, Rule, Several, Triangle
@@ -250,12 +259,8 @@ def check_constants(doc: Document, graph: Digraph, function: Function, k: int, v
     doc.open("input-constants", f"lyapunov.functions[{k}]")
     constants = list(values)
     P, scale = form.entries
-    forms = []
-    for v, c in enumerate(constants):
-        p, q = (c / scale).as_integer_ratio()
-        sized(v + 1, longest((q, q * p)), "constants")
-        forms.append(([q * (node == v) for node in form.nodes], q * p))
-    failed = doc.exact.bounded(P, forms)
+    units = ([int(node == v) for node in form.nodes] for v in range(graph.n))
+    failed = first_unbounded(doc.exact, P, units, (c / scale for c in constants))
     need(failed is None, f"the constant of agent {shorten(graph.labels[failed or 0])} is not proved")
     doc.done(f"at most {up(max(constants))}")
     return constants
@@ -284,7 +289,7 @@ def _bounds(
     row_bits, state_bits = graph.bits + graph.unit.bit_length(), longest(chain.from_iterable(set_rows))
     sized(graph.n_edges + graph.n, row_bits, "the rows of L")
     spend(len(set_rows) * (graph.n_edges + graph.n), row_bits + state_bits, row_bits + state_bits, "the initial states")
-    rows = [{j: Fraction(x, graph.unit) for j, x in graph.row(v).items()} for v in range(graph.n)]
+    rows = [graph.rational_row(v) for v in range(graph.n)]
     reaching = None
     if any(sigma0):
         times = [z for z, s in zip(doc.sections["reaching_time"].z, sigma0, strict=True) if s]
