@@ -27,7 +27,15 @@ from ptcc_certify.checker.matrix_products import (
     need_rows,
     only,
 )
-from ptcc_certify.checker.protocol import Begin, Protocol, SlidingPart, check_sliding_part, sliding_part
+from ptcc_certify.checker.protocol import (
+    Begin,
+    Protocol,
+    SlidingPart,
+    check_sliding_part,
+    last_time,
+    reaching_of,
+    sliding_part,
+)
 from ptcc_certify.checker.reading import RejectedError, length, need
 from ptcc_certify.checker.section_declarations import ByAgent, FewAgents, Positive, Rule, Several, Triangle
 from ptcc_certify.checker.side_files import Numbers
@@ -283,7 +291,7 @@ def _bounds(
     doc: Document, verified: Verified, initial_set: formulas.InitialSet, constants: Sequence[Sequence[Fraction] | None]
 ) -> formulas.InputBounds:
     """Return what bounds the input over the initial states."""
-    graph, g = verified.structure.graph, verified.protocol.gains
+    graph = verified.structure.graph
     sigma0 = list(verified.begin.sigma or ())
     set_rows, _ = integers([initial_set.center, initial_set.radius, *initial_set.axes])
     row_bits, state_bits = graph.bits + graph.unit.bit_length(), longest(chain.from_iterable(set_rows))
@@ -292,10 +300,8 @@ def _bounds(
     rows = [graph.rational_row(v) for v in range(graph.n)]
     reaching = None
     if any(sigma0):
-        times = [z for z, s in zip(doc.sections["reaching_time"].z, sigma0, strict=True) if s]
-        last = None if None in times else max(times)
-        push = g["mu1"] + g["delta"]
-        reaching = formulas.Reaching(sigma0, g["T_r"], g["T_s"], g["mu2"], g["mu3"] * g["kappa"], push, last)
+        last = last_time(doc.sections["reaching_time"].z, sigma0)
+        reaching = reaching_of(verified.protocol.gains, sigma0, last)
     return formulas.InputBounds(
         rows, verified.gain, [f.form for f in verified.functions], constants, initial_set, reaching
     )
