@@ -13,8 +13,8 @@ from fractions import Fraction
 
 import numpy as np
 
-from ptcc_certify.checker.family_bounds import least
 from ptcc_certify.checker.family_function import Scaled
+from ptcc_certify.checker.signal_bounds import least
 from ptcc_certify.graphs.family import Family, Mode
 
 Edge = tuple[int, int, Fraction, Fraction]

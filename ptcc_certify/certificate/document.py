@@ -42,7 +42,6 @@ from ptcc_certify.checker import NOT_OF_FAMILIES, SCHEMA, SLIDING_BOUND, SLIDING
 from ptcc_certify.checker.agent_decrease import PhaseSection
 from ptcc_certify.checker.agent_instants import InstantsSection
 from ptcc_certify.checker.constrained_switching import Section
-from ptcc_certify.checker.family_bounds import FamilyInput
 from ptcc_certify.checker.family_ends import EQUAL
 from ptcc_certify.checker.family_rows import FamilyFunctionsSection
 from ptcc_certify.checker.final_state import FormationSection, InfluenceSection
@@ -53,6 +52,7 @@ from ptcc_certify.checker.protocol import ReachingTimes, SlidingPart
 from ptcc_certify.checker.rates import OvershootSection, RatesSection
 from ptcc_certify.checker.section_declarations import Ball, ByAgent, Several
 from ptcc_certify.checker.side_files import Numbers
+from ptcc_certify.checker.signal_bounds import FamilyInput
 from ptcc_certify.checker.theorem_function import PaperSection
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import analyse

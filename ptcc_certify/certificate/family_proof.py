@@ -36,11 +36,10 @@ from ptcc_certify.certificate.constrained_switching.claims import (
 )
 from ptcc_certify.certificate.functions import ProvedFunction
 from ptcc_certify.certificate.proof import Proof
-from ptcc_certify.checker.family_bounds import deviations, ends_near, peaks
 from ptcc_certify.checker.family_ends import agents_heard, limits
-from ptcc_certify.checker.family_sliding import Drive, last_time
-from ptcc_certify.checker.protocol import sliding_bounded, sliding_part
+from ptcc_certify.checker.protocol import last_time, sliding_bounded, sliding_part
 from ptcc_certify.checker.reading import Interval
+from ptcc_certify.checker.signal_bounds import Drive, deviations, ends_near, peaks
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float

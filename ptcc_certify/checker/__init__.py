@@ -29,9 +29,7 @@ from ptcc_certify.checker.constrained_switching import check_restricted
 from ptcc_certify.checker.contents import BRINGS, FamilyCertificate, GraphCertificate
 from ptcc_certify.checker.document import Document, Recorder
 from ptcc_certify.checker.family import check_family
-from ptcc_certify.checker.family_bounds import check_family_bounds
 from ptcc_certify.checker.family_rows import check_family_functions
-from ptcc_certify.checker.family_sliding import check_drive
 from ptcc_certify.checker.final_state import check_final_state, check_formation
 from ptcc_certify.checker.graph import check_graph
 from ptcc_certify.checker.input import INPUT_NODES, Verified, check_input
@@ -51,6 +49,7 @@ from ptcc_certify.checker.rates import check_rate_bound, check_rates
 from ptcc_certify.checker.reading import SCHEMA, RejectedError, UnreadableError, digest, need, read
 from ptcc_certify.checker.section_declarations import declared
 from ptcc_certify.checker.side_files import SideFiles
+from ptcc_certify.checker.signal_bounds import check_drive, check_family_bounds
 from ptcc_certify.checker.structure import MANY_COMPONENTS, check_claim, check_structure
 from ptcc_certify.checker.theorem_function import check_paper
 

@@ -51,17 +51,10 @@ class Used:
 
     def error_constants(self, graph: Digraph) -> Sequence[Fraction] | None:
         """Return ``c_k`` with ``e_k^2 <= c_k V``; None if they are not known."""
-        function, form = self.function, self.function.form
-        if self.inputs is not None or (form is not None and form.diagonal is None):
-            return self.inputs
-        if form is not None and form.coordinates == "eps":
-            each = {v: rounded(1 / w, BITS, up=True) for v, w in zip(form.nodes, form.diagonal or (), strict=True)}
-            rows = (graph.row(v) for v in range(graph.n))
+        form = self.function.quadratic
+        if self.inputs is None and form.coordinates == "eps":
             spend(graph.n + graph.n_edges, 2 * graph.bits, BITS, "constants of the input")
-            return [sum((x * x * each[j] for j, x in row.items()), Fraction(0)) / graph.unit**2 for row in rows]
-        nodes, weights = (form.nodes, form.diagonal or ()) if form is not None else function.by_rows or ((), ())
-        own = dict(zip(nodes, weights, strict=True))
-        return [1 / own[v] if v in own else Fraction(0) for v in range(graph.n)]
+        return self.inputs if self.inputs is not None else form.error_constants(graph.n, graph.rational_row, BITS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,74 +138,22 @@ def value_of(
 
     Of columns over a scale, by coordinate and derivative; ``P`` is told in integers, times a positive number, and that.
     """
-    (P, times), form = inverse, Weights.of(function)
-    n, total, unit = len(P), 0, 1
+    (P, times), form = inverse, function.quadratic
+    n, total, unit, own = len(P), 0, 1, 1
     for each in columns:
         Z: list[list[int]] = []
         for x in each:
-            z, unit = form.coordinates(graph, x)
+            z, unit = form.coordinates_of(graph, x)
             Z.append(z)
-        U = [form.times(z) for z in Z]
+        U = []
+        for z in Z:
+            pushed, own = form.times(z)
+            U.append(pushed)
         bits = longest(chain.from_iterable(Z)), longest(chain.from_iterable(U))
         spend(n**2 * len(Z[0]), *bits, "initial values")
         spend(n**2, sum(bits), longest(chain.from_iterable(P)), "initial values")
         total += sum(P[i][j] * sum(map(mul, Z[i], U[j])) for i in range(n) for j in range(n))
-    return rounded(Fraction(total, form.scale * (scale * unit) ** 2) / times, BITS, up=True)
-
-
-@dataclass(frozen=True)
-class Weights:
-    """The matrix of a Lyapunov function in integers over ``scale``; its diagonal if it is diagonal.
-
-    Attributes
-    ----------
-    nodes : list of int
-    gauge : list of int
-        Camps of the nodes, in the coordinates ``eps``; empty in ``E``.
-    diagonal : list of int or None
-    matrix : rows of int or None
-    scale : int
-    """
-
-    nodes: Sequence[int]
-    gauge: Sequence[int]
-    diagonal: Sequence[int] | None
-    matrix: Matrix | None
-    scale: int
-
-    @classmethod
-    def of(cls, function: Function) -> Weights:
-        """Return the matrix of a function."""
-        form, rows = function.form, function.by_rows
-        if form is not None and form.diagonal is None:
-            return cls(form.nodes, (), None, *form.entries)
-        if form is not None:
-            (own,), scale = integers([form.diagonal or ()])
-            return cls(form.nodes, form.gauge if form.coordinates == "eps" else (), own, None, scale)
-        nodes, weights = rows or ((), Numbers([]))
-        own, scale = weights.over(range(len(nodes)))
-        return cls(nodes, (), own, None, scale)
-
-    def coordinates(self, graph: Digraph, x: Sequence[int]) -> tuple[list[int], int]:
-        """Return ``L x`` on the nodes, or ``x - (p'G x / p'1) G 1``, in integers over a number; and that."""
-        if not self.gauge:
-            pushed = graph.laplacian_product(x)
-            return [pushed[v] for v in self.nodes], graph.unit
-        p = self.diagonal or ()
-        total, bits = sum(p), longest(x)
-        spend(2 * len(p), total.bit_length(), bits, "initial values")
-        mean = sum(w * g * x[v] for w, g, v in zip(p, self.gauge, self.nodes, strict=True))
-        return [total * x[v] - g * mean for g, v in zip(self.gauge, self.nodes, strict=True)], total
-
-    def times(self, z: Sequence[int]) -> list[int]:
-        """Return the matrix times a vector."""
-        bits = longest(z)
-        if self.matrix is None:
-            own = self.diagonal or ()
-            spend(len(own), longest(own), bits, "initial values")
-            return list(map(mul, own, z))
-        spend(len(z) ** 2, longest(chain.from_iterable(self.matrix)), bits, "initial values")
-        return [sum(map(mul, row, z)) for row in self.matrix]
+    return rounded(Fraction(total, own * (scale * unit) ** 2) / times, BITS, up=True)
 
 
 def adjugate(W: Matrix) -> tuple[Matrix, int]:

@@ -25,7 +25,7 @@ from typing import NamedTuple
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.numbers import integers, longest
 from lmi.exact.work import spend
-from ptcc_certify.checker.agent_bounds import Begin, Weights
+from ptcc_certify.checker.agent_bounds import Begin
 from ptcc_certify.checker.agent_model import Agents, Cascade
 from ptcc_certify.checker.common_motion import States
 from ptcc_certify.checker.digraph import Digraph
@@ -195,13 +195,13 @@ def halvings(
 
 def largest_value(graph: Digraph, function: Function) -> Fraction:
     """Bound ``V`` of one number of every agent that is at most 1, in one coordinate of space."""
-    form = Weights.of(function)
-    if form.matrix is None:
-        total = sum(map(abs, form.diagonal or ()))
-    else:
-        total = sum(map(abs, chain.from_iterable(form.matrix)))
-    reach = Fraction(2 * max(graph.diagonal), graph.unit) if not form.gauge else Fraction(2)
-    return Fraction(total, form.scale) * reach**2
+    form = function.quadratic
+    own, scale = form.weights
+    if form.diagonal is None:
+        P, scale = form.entries
+        own = list(chain.from_iterable(P))
+    reach = Fraction(2 * max(graph.diagonal), graph.unit) if form.coordinates == "E" else Fraction(2)
+    return Fraction(sum(map(abs, own)), scale) * reach**2
 
 
 def value_above(begin: Begin, function: Function, at: Halved) -> Fraction:

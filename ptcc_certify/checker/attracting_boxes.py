@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from lmi.exact.decimal_rounding import down
-from lmi.exact.numbers import integers, longest, sized
+from lmi.exact.numbers import integers
 from lmi.exact.work import spend
 from ptcc_certify.checker.constrained_switching import reachable_bounds
 from ptcc_certify.checker.document import Document
@@ -29,6 +29,7 @@ from ptcc_certify.checker.family_rows import check_follower_rows
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.protocol import Begin
 from ptcc_certify.checker.reading import RejectedError, need
+from ptcc_certify.checker.rows import WeightsBetween
 from ptcc_certify.checker.section_declarations import Nodes, Positive, Several, Vector
 
 
@@ -109,23 +110,18 @@ def _check_box(
     (low, high), _ = integers([lower + [reach[v][0] for v in rest], upper + [reach[v][1] for v in rest]])
     top = dict(zip([*nodes, *rest], high, strict=True))
     bottom = dict(zip([*nodes, *rest], [-y for y in low], strict=True))
-    _check_ends(family, component, nodes, top, bottom)
+    _check_ends(component, nodes, top, bottom)
     doc.done(f"rate {down(rate)}, {n} followers")
 
 
-def _check_ends(
-    family: Family, component: Component, nodes: Sequence[int], top: dict[int, int], bottom: dict[int, int]
-) -> None:
-    """Verify the rows of ``u`` and ``-l`` in every mode."""
-    long = max(longest(top.values()), longest(bottom.values()))
+def _check_ends(component: Component, nodes: Sequence[int], top: dict[int, int], bottom: dict[int, int]) -> None:
+    """Verify the rows of ``u`` and ``-l`` in every mode: numbers ``2 k`` and ``2 k + 1`` of one vector."""
+    ends = {2 * v: y for v, y in top.items()} | {2 * v + 1: y for v, y in bottom.items()}
     for edges in component.part.edges:
-        bits = longest(edge[4] for edge in edges)
-        spend(4 * len(edges), long, bits, "boxes")
-        sized(2 * len(nodes), long + bits + 64, "boxes")
-        margins = dict.fromkeys(nodes, 0), dict.fromkeys(nodes, 0)
-        for s, t, sign, low, high in edges:
-            if t in margins[0]:
-                for margin, own, same, other in ((margins[0], top, top, bottom), (margins[1], bottom, bottom, top)):
-                    gap = own[t] - (same if sign > 0 else other)[s]
-                    margin[t] += (high if gap < 0 else low) * gap
-        need(all(y >= 0 for margin in margins for y in margin.values()), "an agent may leave the box")
+        both = [
+            (2 * s + (same if sign > 0 else other), 2 * t + same, 1, low, high)
+            for s, t, sign, low, high in edges
+            for same, other in ((0, 1), (1, 0))
+        ]
+        rows = WeightsBetween(both, 1).least(ends, ends)
+        need(all(rows[2 * v + side] >= 0 for v in nodes for side in (0, 1)), "an agent may leave the box")

@@ -25,6 +25,7 @@ from ptcc_certify.checker.family import Component, Edge, Family, Mode
 from ptcc_certify.checker.family_ends import agents_heard
 from ptcc_certify.checker.graph import ordered
 from ptcc_certify.checker.reading import RejectedError, need
+from ptcc_certify.checker.rows import WeightsBetween
 from ptcc_certify.checker.section_declarations import Several, Some
 
 
@@ -123,13 +124,9 @@ def _row_ends(
     (whole,), divisor = integers([h])
     bits = longest(edge[4] for edge in edges) + longest(whole)
     unit = mode.unit * divisor
-    spend(2 * len(edges), longest(whole), longest(edge[4] for edge in edges), "final values")
     spend(2 * len(nodes), bits + longest(z), unit.bit_length() + scale.bit_length(), "final values")
     sized(2 * len(nodes), bits + longest(z) + unit.bit_length() + scale.bit_length(), "final values")
-    place = dict(zip(nodes, whole, strict=True))
-    pull = dict.fromkeys(nodes, 0)
-    for s, t, _, low, high in edges:
-        gap = place[s] - place[t]
-        pull[t] += (high if gap > 0 else low) * gap
-    rows = [unit * y + scale * p for y, p in zip(z, pull.values(), strict=True)]
+    heard = dict(zip(nodes, whole, strict=True))
+    pulls = WeightsBetween(edges, mode.unit).least(heard, heard)
+    rows = [unit * y - scale * pulls[v] for v, y in zip(nodes, z, strict=True)]
     return Fraction(max(rows), unit * scale), Fraction(min(rows), unit * scale)

@@ -21,7 +21,6 @@ from ptcc_certify.checker.family import (
     KernelWitness,
     ModeStructures,
 )
-from ptcc_certify.checker.family_bounds import FamilyInput
 from ptcc_certify.checker.family_ends import Mean
 from ptcc_certify.checker.family_function import Multipliers
 from ptcc_certify.checker.family_rows import FamilyFunctionsSection
@@ -48,6 +47,7 @@ from ptcc_certify.checker.section_declarations import (
     Unread,
 )
 from ptcc_certify.checker.settling_leaders import SettlingWitness
+from ptcc_certify.checker.signal_bounds import FamilyInput
 from ptcc_certify.checker.structure import ClaimSection, ComponentSection, ManyComponents, StructureSection
 from ptcc_certify.checker.theorem_function import PaperSection
 

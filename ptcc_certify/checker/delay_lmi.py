@@ -32,7 +32,7 @@ from ptcc_certify.checker.input import Verified, proved_above
 from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above, root_above
 from ptcc_certify.checker.late_form import LARGEST_GROWTH
 from ptcc_certify.checker.late_input import Inputs
-from ptcc_certify.checker.matrix_products import Matrix, Sparse, need_rows, times
+from ptcc_certify.checker.matrix_products import Matrix, Sparse, need_rows, quadratic, times
 from ptcc_certify.checker.messages_asked import PARTS, Messages
 from ptcc_certify.checker.reading import RejectedError, length, need
 from ptcc_certify.checker.section_declarations import FewAgents, Several, Triangle
@@ -316,11 +316,9 @@ class DelayLMI:
 
     def root(self, x0: Sequence[Fraction]) -> Fraction:
         """Bound ``sqrt(V(0))`` from above."""
-        xi = self.loop.coordinates(x0)
-        bits = length(xi)
-        spend(2 * len(xi) ** 2, 2 * bits, longest(chain.from_iterable(self.P)), "V(0)")
-        value = sum((x * y * p for x, row in zip(xi, self.rational, strict=True) for y, p in zip(xi, row, strict=True)))
-        return root_above(Fraction(value))
+        (xi,), unit = integers([self.loop.coordinates(x0)])
+        spend(2 * len(xi) ** 2, 2 * longest(xi), longest(chain.from_iterable(self.P)), "V(0)")
+        return root_above(Fraction(quadratic(self.P, xi), self.scale * unit**2))
 
     def constants(self, exact: Arithmetic) -> AgentConstants:
         """Return what ``P``, which is definite, says of every agent."""

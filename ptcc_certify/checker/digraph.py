@@ -133,6 +133,10 @@ class Digraph:
             self._rows[v] = {v: sum(map(abs, own.values())), **own} if own else {}
         return self._rows[v]
 
+    def rational_row(self, v: int) -> dict[int, Fraction]:
+        """Return row ``v`` of the signed Laplacian, without zeros."""
+        return {j: Fraction(x, self.unit) for j, x in self.row(v).items()}
+
     @cached_property
     def diagonal(self) -> list[int]:
         """The diagonal of the signed Laplacian, times ``unit``."""

@@ -11,7 +11,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from operator import mul
 from typing import Literal
 
 from lmi.exact.decimal_rounding import down
@@ -29,6 +28,7 @@ from ptcc_certify.checker.matrix_products import (
     combined,
     need_rows,
     need_rows_with_multipliers,
+    quadratic,
     times,
     transposed,
 )
@@ -139,19 +139,15 @@ class FamilyFunction:
         """Bound ``sqrt(V)`` of a state."""
         return root_above(self.value(x))
 
-    def value(self, x: Sequence[Fraction]) -> Fraction:
-        """Return ``V`` of a state."""
-        xi, unit = self.component.coordinates(self.nodes, x)
-        spend(len(xi) ** 2, longest(xi), longest(max(row, key=abs) for row in self.matrix), "a Lyapunov function")
-        total = sum(y * sum(map(mul, row, xi)) for y, row in zip(xi, self.matrix, strict=True))
-        return Fraction(total, self.scale * unit**2)
-
     def largest(self, sizes: Mapping[int, Fraction]) -> Fraction:
         """Bound ``V`` of all states with ``|x_k| <= sizes_k``: ``b'|P| b``, ``b = |C| sizes``, by entries."""
-        b, unit = self.component.coordinates(self.nodes, sizes, sizes=True)
-        spend(len(b) ** 2, longest(b), longest(max(row, key=abs) for row in self.matrix), "a Lyapunov function")
-        total = sum(y * sum(map(mul, map(abs, row), b)) for y, row in zip(b, self.matrix, strict=True))
-        return Fraction(total, self.scale * unit**2)
+        return self.value(sizes, sizes=True)
+
+    def value(self, x: Sequence[Fraction] | Mapping[int, Fraction], sizes: bool = False) -> Fraction:
+        """Return ``V`` of a state, or of sizes the largest one."""
+        xi, unit = self.component.coordinates(self.nodes, x, sizes)
+        spend(len(xi) ** 2, longest(xi), longest(max(row, key=abs) for row in self.matrix), "a Lyapunov function")
+        return Fraction(quadratic(self.matrix, xi, sizes), self.scale * unit**2)
 
 
 def check_form(doc: Document, family: Family, component: Component, entry: FormSection, of: str) -> FamilyFunction:

@@ -20,7 +20,7 @@ from typing import Literal
 
 from lmi.exact.decimal_rounding import down
 from lmi.exact.elementary_enclosures import rounded
-from lmi.exact.numbers import common_denominator, integers, longest, sized
+from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import Component, Family, Part
@@ -29,7 +29,7 @@ from ptcc_certify.checker.family_function import FamilyFunction, FormSection, Sc
 from ptcc_certify.checker.family_squares import SquaresFunction, SquaresSection, check_squares
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.reading import need
-from ptcc_certify.checker.rows import WeightsBetween
+from ptcc_certify.checker.rows import RowSystem, WeightsBetween
 from ptcc_certify.checker.section_declarations import Nodes, NotNegative, Positive, Several, Vector
 
 #: Lyapunov functions that are read.
@@ -229,18 +229,10 @@ def check_follower_rows(
     if any(speeds.values()):
         moving = {j: speeds.get(v, 0) for j, v in component.pivots.items()}
         drifts = {v: sum(abs(b) * moving[j] for j, b in kernel[v].items()) for v in followers}
-    units = common_denominator({mode.unit for mode in family.modes}, len(followers), "the weights")
-    most = dict.fromkeys(followers, 0)
     p, q = rate.as_integer_ratio()
-    for mode, edges in zip(family.modes, component.part.edges, strict=True):
-        rows = WeightsBetween(edges, mode.unit)
-        pull, push = rows.least(sizes, sizes), rows.most(sizes, sizes)
-        bits = rows.bits + longest(sizes.values()) + 64
-        spend(len(followers), bits, units.bit_length(), "rows of a family")
-        sized(2 * len(followers), bits + units.bit_length(), "rows of a family")
-        lost, needed, factor = 2 * q * mode.unit, p * mode.unit * unit, units // mode.unit
-        for v in followers:
-            decays = 2 * q * unit * pull[v] - lost * drifts[v] >= needed * sizes[v]
-            need(decays, "a row does not decay fast enough")
-            most[v] = max(most[v], push[v] * factor)
-    return most, Fraction(1, units * scale)
+    pairs = zip(component.part.edges, family.modes, strict=True)
+    rows = RowSystem(family.labels, followers, [WeightsBetween(edges, mode.unit) for edges, mode in pairs])
+    least = [p * unit * sizes[v] + 2 * q * drifts[v] for v in followers]
+    rows.need_rows(sizes, sizes, least, "a row does not decay fast enough", 2 * q * unit)
+    most, units = rows.most(sizes, sizes)
+    return dict(zip(followers, most, strict=True)), Fraction(1, units * scale)

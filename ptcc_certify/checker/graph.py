@@ -12,7 +12,7 @@ from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.reading import entries, exact, fields, need
 from ptcc_certify.checker.section_declarations import Column, Labels, Node, Pattern, Several, Sha256, Unread, read
-from ptcc_certify.checker.side_files import Numbers, beside
+from ptcc_certify.checker.side_files import beside
 
 #: From this number of edges on NumPy is used, where it is there.
 MANY_EDGES = 10_000
@@ -115,11 +115,3 @@ def ordered(labels: Sequence[str], entry: Any, what: str) -> dict[str, Any]:
     """Return an object that has these labels as keys, in this order."""
     need(list(fields(entry, labels, what)) == labels, "agents are in another order")
     return entry
-
-
-def by_agent(doc: Document, graph: Digraph, entry: Any, what: str, files: bool = True) -> Numbers:
-    """Read a number for every agent: an object in their order, or a side vector where ``files`` may be named."""
-    if beside(entry):
-        need(files, f"{what} in a side file")
-        return doc.files.numbers(entry, what, graph.n)
-    return Numbers([exact(x) for x in ordered(graph.labels, entry, what).values()])

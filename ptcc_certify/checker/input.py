@@ -17,8 +17,25 @@ from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.final_state import FinalState
 from ptcc_certify.checker.lyapunov import Function
-from ptcc_certify.checker.matrix_products import Matrix, block, congruence, decrease, less, need_rows, only
-from ptcc_certify.checker.protocol import Begin, Protocol, SlidingPart, check_sliding_part, sliding_part
+from ptcc_certify.checker.matrix_products import (
+    Matrix,
+    block,
+    congruence,
+    decrease,
+    first_unbounded,
+    less,
+    need_rows,
+    only,
+)
+from ptcc_certify.checker.protocol import (
+    Begin,
+    Protocol,
+    SlidingPart,
+    check_sliding_part,
+    last_time,
+    reaching_of,
+    sliding_part,
+)
 from ptcc_certify.checker.reading import RejectedError, length, need
 from ptcc_certify.checker.section_declarations import ByAgent, FewAgents, Positive, Rule, Several, Triangle
 from ptcc_certify.checker.side_files import Numbers
@@ -250,12 +267,8 @@ def check_constants(doc: Document, graph: Digraph, function: Function, k: int, v
     doc.open("input-constants", f"lyapunov.functions[{k}]")
     constants = list(values)
     P, scale = form.entries
-    forms = []
-    for v, c in enumerate(constants):
-        p, q = (c / scale).as_integer_ratio()
-        sized(v + 1, longest((q, q * p)), "constants")
-        forms.append(([q * (node == v) for node in form.nodes], q * p))
-    failed = doc.exact.bounded(P, forms)
+    units = ([int(node == v) for node in form.nodes] for v in range(graph.n))
+    failed = first_unbounded(doc.exact, P, units, (c / scale for c in constants))
     need(failed is None, f"the constant of agent {shorten(graph.labels[failed or 0])} is not proved")
     doc.done(f"at most {up(max(constants))}")
     return constants
@@ -278,19 +291,17 @@ def _bounds(
     doc: Document, verified: Verified, initial_set: formulas.InitialSet, constants: Sequence[Sequence[Fraction] | None]
 ) -> formulas.InputBounds:
     """Return what bounds the input over the initial states."""
-    graph, g = verified.structure.graph, verified.protocol.gains
+    graph = verified.structure.graph
     sigma0 = list(verified.begin.sigma or ())
     set_rows, _ = integers([initial_set.center, initial_set.radius, *initial_set.axes])
     row_bits, state_bits = graph.bits + graph.unit.bit_length(), longest(chain.from_iterable(set_rows))
     sized(graph.n_edges + graph.n, row_bits, "the rows of L")
     spend(len(set_rows) * (graph.n_edges + graph.n), row_bits + state_bits, row_bits + state_bits, "the initial states")
-    rows = [{j: Fraction(x, graph.unit) for j, x in graph.row(v).items()} for v in range(graph.n)]
+    rows = [graph.rational_row(v) for v in range(graph.n)]
     reaching = None
     if any(sigma0):
-        times = [z for z, s in zip(doc.sections["reaching_time"].z, sigma0, strict=True) if s]
-        last = None if None in times else max(times)
-        push = g["mu1"] + g["delta"]
-        reaching = formulas.Reaching(sigma0, g["T_r"], g["T_s"], g["mu2"], g["mu3"] * g["kappa"], push, last)
+        last = last_time(doc.sections["reaching_time"].z, sigma0)
+        reaching = reaching_of(verified.protocol.gains, sigma0, last)
     return formulas.InputBounds(
         rows, verified.gain, [f.form for f in verified.functions], constants, initial_set, reaching
     )

@@ -650,15 +650,10 @@ class InputBounds:
         form, constants = self.form(k), self.constants[k]
         if constants is not None:
             return constants
-        if form.diagonal is None:
-            raise ValueError("a full matrix without constants")
         if (k, "constants") not in self._cache:
-            weight = dict(zip(form.nodes, form.diagonal, strict=True))
-            if form.coordinates == "E":
-                known = [1 / weight[v] if v in weight else Fraction(0) for v in range(len(self.rows))]
-            else:
-                known = [sum((x * x / weight[j] for j, x in row.items()), Fraction(0)) for row in self.rows]
-            self._cache[k, "constants"] = known
+            self._cache[k, "constants"] = form.error_constants(len(self.rows), self.rows.__getitem__)
+        if self._cache[k, "constants"] is None:
+            raise ValueError("a full matrix without constants")
         return self._cache[k, "constants"]
 
     def root_constant(self, k: int, v: int | None) -> Fraction:

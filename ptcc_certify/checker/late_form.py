@@ -6,7 +6,6 @@ from collections.abc import Container, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import chain
-from operator import mul
 from typing import Any
 
 from lmi.exact.decimal_rounding import down
@@ -19,6 +18,7 @@ from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.input import Verified, proved_above
 from ptcc_certify.checker.late_input import Inputs
 from ptcc_certify.checker.lyapunov_form import Form
+from ptcc_certify.checker.matrix_products import quadratic
 from ptcc_certify.checker.messages_asked import Messages
 from ptcc_certify.checker.reading import RejectedError, length, need
 from ptcc_certify.checker.section_declarations import FewAgents
@@ -100,10 +100,8 @@ def function_of(doc: Document, verified: Verified, k: Any) -> Constants:
     deviation, constants = doc.sections["lyapunov"].functions[k].deviation, doc.sections["input"].constants[k]
     need(deviation is not None, "a Lyapunov function without deviations")
     deviations = deviation.agents
-    if form.diagonal is not None:
-        weight = dict(zip(form.nodes, form.diagonal, strict=True))
-        errors = [1 / weight[v] if v in weight else Fraction(0) for v in range(graph.n)]
-    else:
+    errors = form.error_constants(graph.n, graph.rational_row)
+    if errors is None:
         need(constants is not None, "a full matrix without constants")
         errors = list(constants)
     return Constants(form, errors, list(deviations))
@@ -122,8 +120,7 @@ def _value_of_sizes(doc: Document, graph: Digraph, form: Form, sizes: Sequence[F
     """Return ``y'|L'P L| y``, with the sizes of the entries."""
     (M, scale), ((Y,), common) = form.of_state(doc.exact, graph), integers([sizes])
     spend(graph.n**2, longest(chain.from_iterable(M)), longest(Y), "small delays")
-    total = sum(y * sum(map(mul, map(abs, row), Y)) for y, row in zip(Y, M, strict=True) if y)
-    return total / (scale * common**2)
+    return quadratic(M, Y, sizes=True) / (scale * common**2)
 
 
 def initial_value(verified: Verified, form: Form, among: Container[int] | None = None) -> Fraction:

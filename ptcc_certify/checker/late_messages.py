@@ -20,7 +20,7 @@ from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.late_form import LateForm, check_form
 from ptcc_certify.checker.late_input import Inputs
 from ptcc_certify.checker.late_steps import FIXED, Steps, clock_below
-from ptcc_certify.checker.messages_asked import Delays, Messages, Moving, need_left, read_messages
+from ptcc_certify.checker.messages_asked import Delays, Messages, Moving, check_delays, need_left
 from ptcc_certify.checker.missed_deadline import MissedDeadline, check_missed, check_staged
 from ptcc_certify.checker.protocol import Begin, Protocol
 from ptcc_certify.checker.reading import length, need
@@ -116,7 +116,7 @@ def check_messages(doc: Document, of: Verified | Family, protocol: Protocol, beg
         doc.context.edges = len(of.pairs)
     section = doc.section("messages")
     need(begin.sigma is None or not any(begin.sigma.values), "late messages while sliding variables move")
-    messages = read_messages(protocol.gain, section)
+    messages = check_delays(protocol.gain, section)
     if messages.leaders is not None:
         need(not protocol.sliding, "leaders that move under the sliding-mode protocol")
         need(all(getattr(section, key) is None for key in AT_REST), f"one of {', '.join(AT_REST)} though leaders move")

@@ -8,17 +8,16 @@ from fractions import Fraction
 from typing import Literal
 
 from lmi.exact.decimal_rounding import down, up
-from lmi.exact.numbers import integers, longest, shorten, sized
-from lmi.exact.work import spend
+from lmi.exact.numbers import integers, shorten
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.dominance import Proved, check_dominance
 from ptcc_certify.checker.final_state import FinalState
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.lyapunov_form import Form
-from ptcc_certify.checker.matrix_products import Matrix, block, combined, decays, less, need_rows, only
+from ptcc_certify.checker.matrix_products import Matrix, block, combined, decays, first_unbounded, less, need_rows, only
 from ptcc_certify.checker.reading import RejectedError, need
 from ptcc_certify.checker.section_declarations import FewAgents, Several
-from ptcc_certify.checker.side_files import Numbers, beside
+from ptcc_certify.checker.side_files import beside
 from ptcc_certify.checker.structure import Structure
 from ptcc_certify.checker.theorem_function import BlockSection, Paper
 
@@ -68,8 +67,8 @@ class Function:
         ``||z(t)||^2 <= overshoot e^(-rate s) ||z(0)||^2``.
     form : Form or None
         None: proved by rows, in a large graph; the coordinates are ``E``.
-    by_rows : (list of int, Numbers) or None
-        Then its nodes and its diagonal.
+    by_rows : Form or None
+        The form then, which says nothing of single agents of order 1.
     deviation : list of Fraction or None
         ``c_k`` with ``(x_k - (Q x)_k)^2 <= c_k V``.
     """
@@ -78,8 +77,15 @@ class Function:
     rate: Fraction
     overshoot: Fraction
     form: Form | None
-    by_rows: tuple[Sequence[int], Numbers] | None = None
+    by_rows: Form | None = None
     deviation: Sequence[Fraction] | None = None
+
+    @property
+    def quadratic(self) -> Form:
+        """The form, of a large graph too."""
+        form = self.form or self.by_rows
+        assert form is not None
+        return form
 
 
 def check_functions(doc: Document, structure: Structure, final: FinalState, paper: Paper | None) -> list[Function]:
@@ -137,9 +143,11 @@ def _by_rows(doc: Document, structure: Structure, function: FunctionSection, of:
     weights, rate = doc.files.numbers(entry.diagonal, "diagonal", len(nodes)), function.rate
     need(weights.positive(), "a weight is not positive")
     check_dominance(doc, structure, nodes, weights, rate, of, proofs)
-    overshoot = Fraction(max(weights.values)) / Fraction(min(weights.values))
+    low = Fraction(min(weights.values))
+    overshoot = Fraction(max(weights.values)) / low
     need(function.overshoot == overshoot, "the overshoot constant is another")
-    return Function(function.class_, rate, overshoot, None, (nodes, weights))
+    form = Form(rate, "E", nodes, weights, None, low / (weights.scale or 1))
+    return Function(function.class_, rate, overshoot, None, form)
 
 
 def _searched(
@@ -191,14 +199,8 @@ def _deviation(
     structure, (form, scale) = final.structure, scaled_form
     labels = structure.graph.labels
     (D, common, gram), S = final.deviations, only(form, structure.free_nodes)
-    forms: list[tuple[list[int], int]] = []
     constants = list(section.agents)
-    for row, c in zip(D, constants, strict=True):
-        p, q = (c * common**2 / scale).as_integer_ratio()
-        sized((len(forms) + 1) * len(row), longest((q,)) + longest(row), "deviations")
-        spend(len(row), longest((q,)), longest(row), "deviations")
-        forms.append(([q * x for x in row], q * p))
-    failed = doc.exact.bounded(S, forms)  # proves V > 0 besides
+    failed = first_unbounded(doc.exact, S, D, (c * common**2 / scale for c in constants))  # proves V > 0 besides
     need(failed is None, f"the constant of agent {shorten(labels[failed or 0])} is not proved")
     p, q = (section.norm * common**2 / scale).as_integer_ratio()
     N = combined("the deviation of the norm", (p, S), (-q, gram))

@@ -6,7 +6,7 @@ costs is counted before it is formed.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from itertools import chain
 from operator import mul
@@ -96,6 +96,34 @@ def decrease(exact: Arithmetic, F: Matrix, A: Sparse, b: Fraction, unit: int) ->
 def decays(exact: Arithmetic, F: Matrix, A: Sparse, b: Fraction, unit: int, columns: Sequence[int]) -> bool:
     """Tell whether ``F A + A'F - b F > 0`` is proved on some coordinates; see :func:`decrease`."""
     return exact.definite(only(decrease(exact, F, A, b, unit)[0], columns))
+
+
+def quadratic(P: Matrix, z: Sequence[int], sizes: bool = False) -> int:
+    """Return ``z'P z``, or ``z'|P| z`` with the sizes of the entries, which bounds it where ``|z_i|`` is less.
+
+    Examples
+    --------
+    >>> quadratic([[2, -1], [-1, 2]], [1, 1]), quadratic([[2, -1], [-1, 2]], [1, 1], sizes=True)
+    (2, 6)
+    """
+    return sum(x * sum(map(mul, map(abs, row) if sizes else row, z)) for x, row in zip(z, P, strict=True) if x)
+
+
+def first_unbounded(
+    exact: Arithmetic, P: Matrix, rows: Iterable[Sequence[int]], constants: Iterable[Fraction]
+) -> int | None:
+    """Return the first row of which ``(row z)^2 < c z'P z`` is not proved for all ``z``; 0 unless ``P > 0`` is."""
+    forms: list[tuple[list[int], int]] = []
+    count = 0
+    for row, c in zip(rows, constants, strict=True):
+        p, q = c.as_integer_ratio()
+        own = [x for x in row if x]
+        count += len(own)
+        sized(count, longest((q,)) + longest(own), "bounds of agents")
+        sized(len(forms) + 1, longest((q * p,)), "bounds of agents")
+        spend(len(own), longest((q,)), longest(own), "bounds of agents")
+        forms.append(([q * x for x in row], q * p))
+    return exact.bounded(P, forms)
 
 
 def diagonal(values: Sequence[int]) -> Matrix:

@@ -157,8 +157,8 @@ class Delays:
     leaders: Moving | None
 
 
-def read_messages(gain: PrescribedGain, section: Delays) -> Messages:
-    """Read the ages of what is heard, how far it is off, and what caps the gain.
+def check_delays(gain: PrescribedGain, section: Delays) -> Messages:
+    """Verify that what a file says of messages fits together; return ages, errors, and what caps the gain.
 
     Raises
     ------

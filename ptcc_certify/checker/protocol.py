@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -13,7 +13,7 @@ from lmi.exact.numbers import shorten
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.document import Document
-from ptcc_certify.checker.input_formulas import PrescribedGain
+from ptcc_certify.checker.input_formulas import PrescribedGain, Reaching
 from ptcc_certify.checker.reading import RejectedError, need
 from ptcc_certify.checker.section_declarations import ByAgent, FewAgents, NotNegative, Positive
 from ptcc_certify.checker.side_files import Numbers
@@ -26,6 +26,24 @@ REACHING_BITS = 64
 EACH_INSTANT = 12_000
 
 
+def nominal_gain(gains: Mapping[str, Fraction]) -> PrescribedGain:
+    """Return the gain of the nominal part of the input."""
+    T = gains["T_r"] + gains["T_s"] if "T_r" in gains else gains["T"]
+    return PrescribedGain(T, gains["rho1"], gains["rho2"] * gains["kappa"])
+
+
+def reaching_of(gains: Mapping[str, Fraction], sigma0: Sequence[Fraction], z: Fraction | None) -> Reaching:
+    """Return how sliding variables move until all are 0, at ``z`` or ``T_r``."""
+    power, push = gains["mu3"] * gains["kappa"], gains["mu1"] + gains["delta"]
+    return Reaching(sigma0, gains["T_r"], gains["T_s"], gains["mu2"], power, push, z)
+
+
+def last_time(times: Sequence[Fraction | None], sigma0: Iterable[Fraction]) -> Fraction | None:
+    """Return the last reaching time of the sliding variables that are not 0 at first; None: ``T_r``."""
+    own = [z for z, s in zip(times, sigma0, strict=True) if s]
+    return None if None in own else max((z for z in own if z is not None), default=Fraction(0))
+
+
 @dataclass(frozen=True)
 class Protocol:
     """The parameters by name, and whether the protocol is the sliding-mode one."""
@@ -36,8 +54,7 @@ class Protocol:
     @cached_property
     def gain(self) -> PrescribedGain:
         """The gain of the nominal part of the input."""
-        g = self.gains
-        return PrescribedGain(g["T_r"] + g["T_s"] if self.sliding else g["T"], g["rho1"], g["rho2"] * g["kappa"])
+        return nominal_gain(self.gains)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -114,31 +114,92 @@ class WeightsBetween:
 
     def _none(self, own: Any, heard: Any) -> Any:
         """Return rows that are 0, and count what they cost."""
-        bits = max(longest(x.values() if isinstance(x, Mapping) else x) for x in (own, heard))
+        bits = max(_longest(own), _longest(heard))
         spend(4 * (len(self.edges) + len(own)), self.bits, bits, "rows of followers")
         sized(2 * len(own), self.bits + bits + 64, "rows of followers")
         return dict.fromkeys(own, 0) if isinstance(own, Mapping) else [0] * len(own)
 
 
 @dataclass(frozen=True, eq=False)
-class Followers:
-    """Agents that hear others, in every mode.
+class RowSystem:
+    """The rows of some agents that hear others, in every mode.
 
     Attributes
     ----------
     labels : sequence of str
         Of all agents.
     nodes : sequence of int
-        The followers, ascending.
+        Those whose rows they are, ascending.
     modes : sequence of KnownWeights or WeightsBetween
-        The edges of every mode, of all agents.
-    away : Numbers
-        By follower, what ``|x_k(0) - x*_k|`` is at most.
+        The edges of every mode, of all agents that are heard.
     """
 
     labels: Sequence[str]
     nodes: Sequence[int]
     modes: Sequence[KnownWeights | WeightsBetween]
+
+    @cached_property
+    def bits(self) -> int:
+        """Bits of the longest row."""
+        return max(mode.bits for mode in self.modes)
+
+    def label(self, k: int) -> str:
+        """Return the label of the agent of row ``k``, for a message."""
+        return shorten(self.labels[self.nodes[k]])
+
+    def need_rows(
+        self, own: Any, heard: Any, least: Sequence[int], why: str, times: int = 1, ages: ByAge = None
+    ) -> None:
+        """Verify that ``times`` the rows are at least these numbers, in every mode.
+
+        Parameters
+        ----------
+        own, heard : sequence of N int, or mapping of int to int
+            By agent.
+        least : sequence of int
+            By row.
+        why : str
+            What is the matter otherwise; ``{}`` is an agent.
+        times : int
+        ages : ByAge
+        """
+        for mode in self.modes:
+            rows, unit = mode.least(own, heard, ages), mode.unit
+            bits = _longest(heard) + mode.bits, longest((times, unit)) + longest(least)
+            spend(3 * len(least), *bits, "rows of followers")
+            pairs = enumerate(zip(self.nodes, least, strict=True))
+            low = next((k for k, (v, x) in pairs if times * rows[v] < unit * x), None)
+            need(low is None, why.format(self.label(low or 0)))
+
+    def most(self, own: Any, heard: Any) -> tuple[list[int], int]:
+        """Bound ``sum_l |w_kl| (own_k + heard_l)`` of every row over all members, times a unit; and this.
+
+        Parameters
+        ----------
+        own, heard : sequence of N int, or mapping of int to int
+            By agent; not negative.
+        """
+        unit = common_denominator({mode.unit for mode in self.modes}, len(self.nodes), "the weights")
+        most = [0] * len(self.nodes)
+        for mode in self.modes:
+            rows, factor = mode.most(own, heard), unit // mode.unit
+            bits = mode.bits + max(_longest(own), _longest(heard))
+            spend(2 * len(most), bits, factor.bit_length(), "rows of followers")
+            sized(2 * len(most), bits + unit.bit_length(), "rows of followers")
+            most = [max(x, factor * rows[v]) for x, v in zip(most, self.nodes, strict=True)]
+        return most, unit
+
+
+@dataclass(frozen=True, eq=False)
+class Followers(RowSystem):
+    """Agents that hear others, in every mode.
+
+    Attributes
+    ----------
+    away : Numbers
+        By follower, what ``|x_k(0) - x*_k|`` is at most.
+    """
+
     away: Numbers
 
     @cached_property
@@ -147,11 +208,6 @@ class Followers:
         inside = set(self.nodes)
         return [v for v in range(len(self.labels)) if v not in inside]
 
-    @cached_property
-    def bits(self) -> int:
-        """Bits of the longest row."""
-        return max(mode.bits for mode in self.modes)
-
     def whole(self, values: Sequence[int]) -> list[int]:
         """Return values of all agents, 0 of those that are no followers."""
         whole = [0] * len(self.labels)
@@ -159,54 +215,10 @@ class Followers:
             whole[v] = x
         return whole
 
-    def label(self, k: int) -> str:
-        """Return the label of follower ``k``, for a message."""
-        return shorten(self.labels[self.nodes[k]])
-
     @cached_property
     def degrees(self) -> tuple[list[int], int]:
-        """``D_k`` of every follower at most, times the unit of :meth:`largest`; and this."""
-        most, unit = self.largest([1] * len(self.nodes), heard=0)
-        return most, unit
-
-    def need_rows(
-        self,
-        own: Sequence[int],
-        heard: Sequence[int],
-        least: Sequence[int],
-        why: str,
-        times: int = 1,
-        ages: ByAge = None,
-    ) -> None:
-        """Verify that ``times`` the rows of the followers are at least these numbers, in every mode.
-
-        Parameters
-        ----------
-        own, heard : sequence of N int
-        least : sequence of F int
-            By follower.
-        why : str
-            What is the matter otherwise; ``{}`` is a follower.
-        times : int
-        ages : ByAge
-        """
-        for mode in self.modes:
-            rows, unit = mode.least(own, heard, ages), mode.unit
-            bits = longest(heard) + mode.bits, longest((times, unit)) + longest(least)
-            spend(3 * len(least), *bits, "rows of followers")
-            pairs = enumerate(zip(self.nodes, least, strict=True))
-            low = next((k for k, (v, x) in pairs if times * rows[v] < unit * x), None)
-            need(low is None, why.format(self.label(low or 0)))
-
-    def largest(self, values: Sequence[int], heard: int = 1) -> tuple[list[int], int]:
-        """Bound ``sum_l |w_kl| (u_k + heard u_l)`` of every follower over all members, times a unit; and this."""
-        unit = common_denominator({mode.unit for mode in self.modes}, len(self.nodes), "the weights")
-        most, whole = [0] * len(self.nodes), self.whole(values)
-        for mode in self.modes:
-            rows, factor = mode.most(whole, [heard * x for x in whole]), unit // mode.unit
-            spend(2 * len(most), mode.bits + longest(values), factor.bit_length(), "rows of followers")
-            most = [max(x, factor * rows[v]) for x, v in zip(most, self.nodes, strict=True)]
-        return most, unit
+        """``D_k`` of every follower at most, times the unit of :meth:`most`; and this."""
+        return self.most([1] * len(self.labels), [0] * len(self.labels))
 
     def need_decay(self, u: Sequence[int], q: Fraction, b: Fraction, parts: Sequence[int]) -> None:
         """Verify ``sum_l |w_kl| (u_k - q^(part_kl/64) u_l) >= b u_k``, ``u`` of all agents; parts as ages have them."""
@@ -289,7 +301,12 @@ class Rows:
     @cached_property
     def largest(self) -> tuple[list[int], int]:
         """``sum_l |w_kl| (u_k + u_l)`` of every follower at most, times the scale of ``u`` and a unit; and this."""
-        return self.followers.largest(self.u)
+        return self.followers.most(self.whole, self.whole)
+
+
+def _longest(values: Any) -> int:
+    """Return the bits of the longest of some integers, of a list or by agent."""
+    return longest(values.values() if isinstance(values, Mapping) else values)
 
 
 def _times(factor: int, values: Sequence[int], less: int = 0) -> list[int]:

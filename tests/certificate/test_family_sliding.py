@@ -18,8 +18,8 @@ from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.family_proof import ComponentProof
 from ptcc_certify.certificate.runs_against_bounds import compare, functions_of, worst_case_signals
 from ptcc_certify.checker import check, digest
-from ptcc_certify.checker.family_sliding import Drive, drive_sizes
 from ptcc_certify.checker.input_formulas import root_above
+from ptcc_certify.checker.signal_bounds import Drive, drive_sizes
 from ptcc_certify.errors import Change, ParameterError, spell
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family

@@ -24,6 +24,7 @@ from ptcc_certify.checker.agent_model import Agents
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.checker.lyapunov import Function
+from ptcc_certify.checker.lyapunov_form import Form
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
@@ -130,7 +131,8 @@ def checked_begin(structure: Structure, protocol: AgentsProtocol, matrix: AgentM
 
 def checked_function(V: LyapunovFunction) -> Function:
     """Return a Lyapunov function as the check reads it, without its constants."""
-    by_rows = (V.nodes, Numbers(V.weights)) if V.form is None else None
+    large = V.form is None
+    by_rows = Form(V.proved_rate, "E", V.nodes, Numbers(V.weights), None, min(V.weights)) if large else None
     return Function("", V.proved_rate, Fraction(1), V.form, by_rows)
 
 

@@ -15,10 +15,9 @@ import numpy as np
 
 from ptcc_certify.bounds.envelope import Instants
 from ptcc_certify.bounds.reaching_phase import ReachingPhase
-from ptcc_certify.checker.family_bounds import Function as BoundsFunction
-from ptcc_certify.checker.family_bounds import deviations, least
 from ptcc_certify.checker.family_function import Scaled
-from ptcc_certify.checker.family_sliding import Drive
+from ptcc_certify.checker.signal_bounds import Drive, deviations, least
+from ptcc_certify.checker.signal_bounds import Function as BoundsFunction
 from ptcc_certify.graphs.rationals import nearest_float
 
 _SLACK = 1 + 1e-12
