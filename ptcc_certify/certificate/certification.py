@@ -172,12 +172,15 @@ def certify_case(
     Certificate
     """
     origins = origins_of(case.graph, case.initial) | dict(origins or {})
-    case = with_vehicles(case.with_plain_agents()).with_rows()
+    of_family = bool(case.uncertainty or is_family(case.graph))
+    case = with_vehicles(case.with_plain_agents()).with_rows(of_family)
     _refuse_before_reading(case)
-    progress, family = listener(progress), _read_family(case)
+    progress, family = listener(progress), _read_family(case) if of_family else None
     graph = as_graph(case.graph) if family is None else family.modes[0].mandatory
     refuse_before_the_graph(case)
     if family is None:
+        if case.signal != "any":
+            raise ParameterError("signal is for families of graphs, which change; this is one graph: leave it out")
         refuse_long_weights(graph)
     else:
         refuse_signals(family, case)
@@ -228,12 +231,8 @@ def with_word_of_check(certificate: Certificate) -> Certificate:
     return certificate
 
 
-def _read_family(case: Case) -> Family | None:
-    """Return the family that is asked about, or refuse what it does not take; None for one graph."""
-    if not (case.uncertainty or is_family(case.graph)):
-        if case.signal != "any":
-            raise ParameterError("signal is for families of graphs, which change; this is one graph: leave it out")
-        return None
+def _read_family(case: Case) -> Family:
+    """Return the family that is asked about, or refuse what it does not take."""
     refuse_of_families(case)
     family = as_family(case.graph, uncertainty=case.uncertainty)
     if case.messages is not None or case.leaders is not None:

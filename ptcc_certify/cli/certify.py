@@ -161,8 +161,8 @@ def _case_of(
     if not family:
         refuse_unheard(one, options)
     messages, leaders = messages_of(graphs, given, options), leaders_of(options)
-    if family and (messages is not None or leaders is None):
-        limits = ()
+    if family and messages is not None:
+        limits = ()  # a cap is theirs
     if isinstance(given, Family) and messages is not None and isinstance(messages.delay, Mapping):
         given = replace(given, notes=noted_delays(given.notes, options["delay"]))
     if options["kind"] == "nominal":

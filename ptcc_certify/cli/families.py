@@ -12,12 +12,7 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.agents import exchanges_virtual
 from ptcc_certify.cli.click_options import SIGNAL, click_option, flag_of, options_asking, options_for, together
-from ptcc_certify.cli.messages_and_leaders import (
-    asks_for_leaders,
-    asks_for_messages,
-)
 from ptcc_certify.cli.terminal import Screen, print_json
 from ptcc_certify.errors import ExitCode, ParameterError, one_line
 from ptcc_certify.graphs.declared_option import options_of
@@ -41,7 +36,9 @@ if TYPE_CHECKING:
 
 #: Options of certify that families do not take; agents are refused by themselves, disturbances by the protocol.
 _NOT_OF_FAMILIES = tuple(
-    name for name in options_asking(["method", *NOT_OF_FAMILIES]) if name not in ("agents", "disturbance", "delta")
+    name
+    for name in options_asking(["method", *NOT_OF_FAMILIES])
+    if name not in ("agents", "disturbance", "delta", "noise", "gain_cap")
 )
 
 
@@ -297,13 +294,7 @@ def _refuse_disturbance(options: shared.Options) -> None:
 def refuse_options(options: shared.Options) -> None:
     """Refuse what is asked of one graph alone, on the command line or in a scenario."""
     source = click.get_current_context().get_parameter_source
-    foreign = [*_NOT_OF_FAMILIES]
-    if options["kind"] == "nominal":
-        foreign += ["disturbance", "delta"]
-    by_rows = asks_for_messages(options) or asks_for_leaders(options)
-    if by_rows or exchanges_virtual(options):
-        taken = ("gain_cap", "delta", "noise") if by_rows else ("gain_cap",)
-        foreign = [name for name in foreign if name not in taken]
+    foreign = [*_NOT_OF_FAMILIES, *(["disturbance"] if options["kind"] == "nominal" else [])]
     for name in foreign:
         given = source(name) in (ParameterSource.COMMANDLINE, ParameterSource.DEFAULT_MAP)
         if given and options[name] not in (None, False):

@@ -107,11 +107,12 @@ class Case:
             return replace(self, agents=None)
         return self if self.sliding else replace(self, agents=None, limits=self.limits_with(self.agents))
 
-    def with_rows(self) -> Case:
+    def with_rows(self, of_family: bool = False) -> Case:
         """Return the case with all that is asked beside late messages and moving leaders told as part of these.
 
         Disturbances are those of the followers of leaders, which may rest; noise within NU is an error of values of 2
-        NU; what moves or disturbs is told by messages, of which nothing need be late then.
+        NU; what moves or disturbs is told by messages, of which nothing need be late then. Of one graph both are judged
+        otherwise where neither messages are late nor leaders move.
 
         Examples
         --------
@@ -122,7 +123,10 @@ class Case:
 MovingLeaders(speed=0, disturbance=1), None, None)
         """
         messages, leaders, asks = self.messages, self.leaders, self.asks
-        if (messages is None and leaders is None) or self.sliding:
+        of_order_n = isinstance(self.agents, Agents) and not self.agents.of_paper  # who take neither, and are refused
+        limits, cap, error = self.limits, self._only_cap, Fraction(0)
+        more = of_family and (asks.delta is not None or asks.noise is not None or cap is not None)
+        if not (messages is not None or leaders is not None or more) or self.sliding or of_order_n:
             return self
         if asks.delta is not None and (leaders is None or not leaders.disturbance):
             speed, sign = (0, None) if leaders is None else (leaders.speed, leaders.sign_gain)
@@ -130,19 +134,18 @@ MovingLeaders(speed=0, disturbance=1), None, None)
             leaders, asks = MovingLeaders(speed, delta, sign), replace(asks, delta=None)
         if leaders is not None and not leaders.total and leaders.sign_gain is None:
             leaders = None  # they rest, and nothing disturbs anybody
-        if messages is None and leaders is None:
-            return replace(self, leaders=None)
-        limits, cap = self.limits, self._only_cap
-        if messages is None and (cap is not None or not limits):
-            messages = LateMessages(leaders=leaders)
+        if asks.noise is not None and (messages is not None or leaders is not None or of_family):
+            error, asks = 2 * parameter("noise", asks.noise), replace(asks, noise=None)
+        if of_family and cap is not None and messages is None and leaders is None and not error:
+            leaders = MovingLeaders(speed=0)  # whom followers settle behind, but for what a cap leaves
+        if messages is None and ((leaders is None and not error) or (limits and cap is None)):
+            return replace(self, leaders=leaders, asks=asks)  # nothing is left to tell, or limits that are refused
         if messages is None:
-            return replace(self, leaders=leaders, asks=asks)  # refused for its limits
-        messages = replace(messages, leaders=leaders)
+            messages = LateMessages(value_error=error, leaders=leaders)
+        else:
+            messages = replace(messages, value_error=messages.value_error + error, leaders=leaders)
         if cap is not None and messages.gain_cap is None:
             messages, limits = replace(messages, gain_cap=cap), ()
-        if asks.noise is not None:
-            error = messages.value_error + 2 * parameter("noise", asks.noise)
-            messages, asks = replace(messages, value_error=error), replace(asks, noise=None)
         return replace(self, messages=messages, leaders=leaders, asks=asks, limits=limits)
 
     @property
