@@ -198,9 +198,9 @@ def judge_limits(proof: GraphProof) -> list[Answer]:
 def at_deadline(proof: GraphProof | FamilyProof, answer: Answer) -> Answer:
     """Return what becomes at ``T``, where messages are late or leaders move, of a behaviour that follows elsewhere."""
     late = proof.late
-    if late is not None and late.tracks and late.largest and answer.status == MET:
+    if late is not None and late.tracks and late.leaders is not None and late.largest and answer.status == MET:
         why = "nothing is proved of that" if math.isinf(late.largest) else "nothing settles under a cap"
-        return Answer(OPEN, f"{answer.what} at T {_moved(proof.leaders_move)}", why)
+        return Answer(OPEN, f"{answer.what} at T {late.leaders.while_told}", why)
     if proof.asked_messages is None or answer.status != MET or proof.constant:
         return answer
     what = f"{answer.what} at T with {proof.asked_messages.name}"
@@ -231,7 +231,7 @@ def judge_rate_beside(proof: GraphProof | FamilyProof, least: Fraction, what: st
     if proof.constant or proof.agents is not None:
         return None
     if proof.asked_leaders is not None:
-        return Answer(OPEN, what, f"no rate is proved {_moved(proof.leaders_move)}")
+        return Answer(OPEN, what, f"no rate is proved {proof.asked_leaders.while_told}")
     if any(limits.sample_period is not None for limits in proof.limits):
         return Answer(OPEN, what, "no rate is proved of a gain that is held")
     if proof.asked_messages is None or (late is not None and late.direct):
@@ -242,10 +242,6 @@ def judge_rate_beside(proof: GraphProof | FamilyProof, least: Fraction, what: st
         return Answer(OPEN, what, f"no rate is proved {whose}")
     rate = 2 * late.lmi.b
     return Answer(MET if rate >= least else OPEN, what, f"with {late.messages.name} {down(rate)} is proved")
-
-
-def _moved(leaders_move: bool) -> str:
-    return "while leaders move" if leaders_move else "under disturbances"
 
 
 def judge_messages(proof: GraphProof | FamilyProof) -> list[Answer]:
@@ -323,7 +319,8 @@ def _judge_late_input(proof: GraphProof | FamilyProof, late: LateBounds, most: F
     """Tell whether every input stays within so much with late messages."""
     largest = largest_late_input(late, proof.protocol)
     if largest is None:
-        why = f"no bound is proved {_moved(proof.leaders_move) if late.tracks else f'with {late.messages.name}'}"
+        tracked = late.leaders if late.tracks else None
+        why = f"no bound is proved {tracked.while_told if tracked is not None else f'with {late.messages.name}'}"
         if late.messages.vehicles is not None:
             why = "no bound is proved of virtual positions without a cap"
         elif late.heard_right and not late.tracks:

@@ -21,7 +21,6 @@ from ptcc_certify.cli.click_options import (
     OF_PROTOCOL,
     Command,
     Decorator,
-    exact_number,
     flag_of,
     given_of,
     names_of,
@@ -327,24 +326,3 @@ def read_initial_state(
         scale = Fraction(1) if within is None else min(Fraction(1), abs(within) / 10)
         return [scale * x for (x,) in random_states(seed, graph.n_nodes)]
     return read_state(x0, graph, name)
-
-
-def read_initial_states(options: Options, graph: SignedDigraph) -> Any:
-    """Return the initial states of agents of ``--dimension`` components, one column for each."""
-    import numpy as np
-
-    from ptcc_certify.graphs.io import random_states
-
-    x0, seed, dimension = options["x0"], options["seed"], options["dimension"]
-    n = graph.n_nodes
-    if dimension == 1:
-        return read_initial_state(x0, seed, graph, within=options["initial_bound"])
-    if x0 == "random":
-        return random_states(seed, n, dimension)
-    texts = x0.split(",")
-    if len(texts) != n * dimension:
-        raise ParameterError(
-            f"--x0 has {counted(len(texts), 'value')} for {counted(n, 'agent')} of dimension {dimension}; "
-            f"give {n * dimension} numbers, agent after agent"
-        )
-    return np.array([exact_number(text, "--x0") for text in texts]).reshape(n, dimension)

@@ -19,6 +19,7 @@ from ptcc_certify.cli.agents import (
     agents_options,
     exchanges_virtual,
     places_of,
+    read_vectors,
     refuse_agents_of_family,
     run_in_places,
     run_of_agents,
@@ -255,7 +256,11 @@ def _run(
         from ptcc_certify.simulation.nominal import Bounded
 
         more["noise"] = Bounded("telegraph", options["noise"])
-    x0 = shared.read_initial_states(options, signed)
+    x0, seed = options["x0"], options["seed"]
+    if options["dimension"] == 1:
+        x0 = shared.read_initial_state(x0, seed, signed, within=options["initial_bound"])
+    else:
+        x0 = read_vectors(x0, seed, signed, options["dimension"], "--x0")
     return run_in_places(signed, protocol, x0, places, times=times, **more)
 
 
