@@ -24,7 +24,6 @@ from ptcc_certify.model.base import Protocol
 from ptcc_certify.model.constrained_switching import ClockShares, JointWindows
 from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
-from ptcc_certify.theorems.family_special_cases import component_holds, component_refutation
 from ptcc_certify.theorems.last_mode import last_mode_shows
 
 
@@ -352,10 +351,10 @@ def judge_family_behaviour(components: Sequence[FamilyComponent], expected: str)
     >>> print(judge_family_behaviour(decide(Family.from_intervals([("a", "b", 0, 1)])), "bipartite consensus"))
     bipartite consensus (held constant, the leader groups of a and b do not hear each other, and do not meet)
     """
-    answers = [component_holds(component, expected) for component in components]
+    answers = [component.holds(expected) for component in components]
     if False in answers:
         component = components[answers.index(False)]
-        why = component_refutation(component, expected)
+        why = component.refutation(expected)
         other = f"it is {component.behaviour}"
         return Answer(REFUTED, expected, other if why is None else counterexample_text(component, why))
     return Answer(OPEN, expected, "not decided") if None in answers else Answer(MET, expected)
