@@ -11,25 +11,16 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+from ptcc_certify.cli import messages_and_leaders as asked
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.agents import exchanges_virtual
 from ptcc_certify.cli.click_options import SIGNAL, click_option, flag_of, options_asking, options_for, together
-from ptcc_certify.cli.messages_and_leaders import (
-    asks_for_leaders,
-    asks_for_messages,
-)
 from ptcc_certify.cli.terminal import Screen, print_json
 from ptcc_certify.errors import ExitCode, ParameterError, one_line
 from ptcc_certify.graphs.declared_option import options_of
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import OPTIONAL, UNCERTAINTY
-from ptcc_certify.model.constrained_switching import (
-    CLOCK_DWELL,
-    WINDOWS_OF_TIME,
-    ClockShares,
-    DwellTime,
-    JointWindows,
-)
+from ptcc_certify.model.constrained_switching import CLOCK_DWELL, WINDOWS_OF_TIME, ClockShares, DwellTime, JointWindows
 from ptcc_certify.model.refusals import NOT_OF_FAMILIES
 
 if TYPE_CHECKING:
@@ -300,7 +291,7 @@ def refuse_options(options: shared.Options) -> None:
     foreign = [*_NOT_OF_FAMILIES]
     if options["kind"] == "nominal":
         foreign += ["disturbance", "delta"]
-    by_rows = asks_for_messages(options) or asks_for_leaders(options)
+    by_rows = asked.asks_for_messages(options) or asked.asks_for_leaders(options)
     if by_rows or exchanges_virtual(options):
         taken = ("gain_cap", "delta", "noise") if by_rows else ("gain_cap",)
         foreign = [name for name in foreign if name not in taken]
