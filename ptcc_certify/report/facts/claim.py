@@ -17,8 +17,7 @@ from ptcc_certify.graphs.structure import BIPARTITE_CONTAINMENT, STABILITY, Stru
 from ptcc_certify.report.facts.agents import claimed_of
 from ptcc_certify.report.facts.constrained_switching import RESTS, of_mode
 from ptcc_certify.report.facts.input import without
-from ptcc_certify.report.facts.interval_words import interval_text
-from ptcc_certify.report.text_layout import TEXT, agent_text, columns, printable, shorten_list, wrap_text
+from ptcc_certify.report.text_layout import TEXT, agent_text, columns, interval_text, printable, shorten_list, wrap_text
 from ptcc_certify.theorems.agreeing_groups import AgreeingGroup, FamilyGroups
 from ptcc_certify.theorems.claims import Claim
 from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
