@@ -115,7 +115,7 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
         _refuse_messages(options, "families of graphs")
     elif special:
         motion = _run_agents(graph[0], signed, protocol, options)
-        _write(motion, output, "agents_motion.plot_motion", {"wide": wide, "time_unit": time_unit})
+        _write(motion, output, "motion.plot_motion", {"wide": wide, "time_unit": time_unit})
         if protocol.reaching is not None:
             click.echo("note: u is without the sliding terms, which cancel the disturbance", err=True)
         return ExitCode.OK

@@ -43,7 +43,7 @@ from ptcc_certify.graphs.structure import (
     weak_components,
 )
 from ptcc_certify.lazy_report import Shown, rendered
-from ptcc_certify.theorems.family_kernel import Kernel, StateEnclosure, TooLarge, first_answer
+from ptcc_certify.theorems.kernel import Kernel, StateEnclosure, TooLarge, first_answer
 
 __all__ = ["DEPENDS", "SIGNALS", "Counterexample", "FamilyComponent", "Kernel", "TooLarge", "decide"]
 

@@ -11,8 +11,8 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.model import NominalProtocol, Protocol
+from ptcc_certify.report.plots.camp_lines import CAMP_STYLES, NAME_SIZE, NAMED_AGENTS, camp_groups, name_agents
 from ptcc_certify.report.plots.graph import plot_graph
-from ptcc_certify.report.plots.lines_of_agents import CAMP_STYLES, NAME_SIZE, NAMED_AGENTS, camp_groups, name_agents
 from ptcc_certify.report.plots.style import axes_of, finished, styled, time_label
 from ptcc_certify.report.text_layout import printable, shorten_text
 from ptcc_certify.simulation.run import simulate
@@ -28,7 +28,7 @@ from ptcc_certify.theorems.family_behaviour import (
     Counterexample,
     FamilyComponent,
 )
-from ptcc_certify.theorems.family_kernel import Kernel
+from ptcc_certify.theorems.kernel import Kernel
 
 #: Where the second of two leader groups begins, the first at 1.
 _SECOND = 0.5

@@ -13,7 +13,7 @@ from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS
 from ptcc_certify.model.reaching_time import ReachingTime
-from ptcc_certify.report.plots.lines_of_agents import (
+from ptcc_certify.report.plots.camp_lines import (
     CAMP_STYLES,
     NAMED_AGENTS,
     draw_agents,

@@ -14,7 +14,7 @@ from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.report.plots.lines_of_agents import (
+from ptcc_certify.report.plots.camp_lines import (
     CAMP_STYLES,
     HALO,
     NAME_SIZE,

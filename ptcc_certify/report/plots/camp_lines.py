@@ -51,7 +51,7 @@ def family_camps(family: Family) -> np.ndarray | None:
 
     Examples
     --------
-    >>> from ptcc_certify.report.plots.lines_of_agents import family_camps
+    >>> from ptcc_certify.report.plots.camp_lines import family_camps
     >>> family_camps(ptcc.as_family([("a", "b", -2, -1)])).tolist()
     ['first camp', 'second camp']
     """
@@ -64,7 +64,7 @@ def family_groups(family: Family) -> np.ndarray:
 
     Examples
     --------
-    >>> from ptcc_certify.report.plots.lines_of_agents import family_groups
+    >>> from ptcc_certify.report.plots.camp_lines import family_groups
     >>> day, night = SignedDigraph.from_edges([("a", "b", 1)]), SignedDigraph.from_edges([("b", "a", 1)], nodes="ab")
     >>> family_groups(Family.switching([day, night])).tolist()
     ['first camp', 'first camp']
