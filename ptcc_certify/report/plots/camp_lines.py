@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -74,6 +74,23 @@ def family_groups(family: Family) -> np.ndarray:
         return own[0]
     camps = family_camps(family)
     return np.full(family.n_nodes, "agents", dtype=object) if camps is None else camps
+
+
+def camp_lines(groups: np.ndarray, agents: Iterable[int]) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Yield agents, each with how its line is drawn; the first of a part of the graph has its name for the legend.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.camp_lines import camp_lines
+    >>> [(k, style["label"]) for k, style in camp_lines(np.array(["followers", "agents", "followers"]), [0, 1, 2])]
+    [(0, 'followers'), (1, 'agents'), (2, None)]
+    """
+    seen = set[str]()
+    for k in agents:
+        name = str(groups[k])
+        colour, line = CAMP_STYLES[name]
+        yield k, {"color": colour, "linestyle": line, "label": None if name in seen else name}
+        seen.add(name)
 
 
 def text_width(text: str) -> float:
