@@ -100,8 +100,8 @@ _EXPORTS = {
     "Ensemble": "graphs.ensembles",
     "certify_many": "batch",
     # Figures
-    "plot_motion": "report.plots.agents_motion",
-    "plot_formation": "report.plots.agents_motion",
+    "plot_motion": "report.plots.motion",
+    "plot_formation": "report.plots.motion",
     "plot_trajectory": "report.plots.trajectory",
     "plot_decay": "report.plots.decay",
     "plot_run": "report.plots.trajectory",

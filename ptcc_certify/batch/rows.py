@@ -56,6 +56,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+import ptcc_certify
 from lmi.exact.decimal_rounding import float_down, float_up
 from ptcc_certify.batch.settings import Settings, StateLike
 from ptcc_certify.certificate.certificate import Certificate
@@ -134,12 +135,7 @@ def failed_row(name: str, why: str) -> Row:
 
 def package_version() -> str:
     """Return the version of this package, on which rows depend."""
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return version("ptcc-certify")
-    except PackageNotFoundError:
-        return "unknown"
+    return str(ptcc_certify.__version__)
 
 
 def _graph(name: str, payload: Any, settings: Settings) -> SignedDigraph:
@@ -184,12 +180,7 @@ def _read_initial_state(initial_state: StateLike, seed: Any, graph: SignedDigrap
 
 def _columns(certificate: Certificate) -> Row:
     proof = certificate.graph_proof
-    structure, effort, comparison = (
-        proof.structure,
-        proof.effort,
-        certificate.comparison,
-    )
-    rate = proof.rate
+    structure, effort, comparison, rate = proof.structure, proof.effort, certificate.comparison, proof.rate
     result, reaching = proof.final_state, proof.reaching
     return {
         "connectivity": structure.connectivity,

@@ -9,7 +9,6 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.theorems.agreeing_groups import FamilyGroups
 from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
-from ptcc_certify.theorems.family_special_cases import special_behaviours
 
 
 def decision_document(family: Family, components: Sequence[FamilyComponent]) -> dict[str, Any]:
@@ -40,7 +39,7 @@ def _component(family: Family, component: FamilyComponent) -> dict[str, Any]:
     document: dict[str, Any] = {
         "nodes": labels,
         "behaviour": component.behaviour,
-        "special": list(special_behaviours(component)),
+        "special": list(component.special),
         "camps": None if gauge is None else dict(zip(labels, gauge.tolist(), strict=True)),
         "counterexample": None if why is None else {"kind": why.kind, "text": counterexample_text(component, why)},
     }

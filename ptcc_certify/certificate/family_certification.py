@@ -45,8 +45,8 @@ from ptcc_certify.model import Protocol
 from ptcc_certify.model.case import Case
 from ptcc_certify.model.constrained_switching import ClockShares, JointWindows, read_signal
 from ptcc_certify.model.reaching_time import ReachingTime
+from ptcc_certify.theorems.contractions import refuse_impossible_windows
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, decide
-from ptcc_certify.theorems.joint_windows import refuse_impossible_windows
 
 STEPS = ("the decision", "upper bound on the decay rate", "Lyapunov functions", STEP, "independent check")
 BOXES = "boxes of followers"

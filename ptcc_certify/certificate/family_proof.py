@@ -49,7 +49,7 @@ from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.slow_signals import SignalRateBound
 from ptcc_certify.model.constrained_switching import SignalClass
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
-from ptcc_certify.theorems.family_kernel import UNKNOWN
+from ptcc_certify.theorems.kernel import UNKNOWN
 
 
 @dataclass(frozen=True, eq=False)

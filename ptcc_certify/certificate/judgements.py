@@ -24,7 +24,6 @@ from ptcc_certify.model.base import Protocol
 from ptcc_certify.model.constrained_switching import ClockShares, JointWindows
 from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
-from ptcc_certify.theorems.family_special_cases import component_holds, component_refutation
 from ptcc_certify.theorems.last_mode import last_mode_shows
 
 
@@ -198,9 +197,9 @@ def judge_limits(proof: GraphProof) -> list[Answer]:
 def at_deadline(proof: GraphProof | FamilyProof, answer: Answer) -> Answer:
     """Return what becomes at ``T``, where messages are late or leaders move, of a behaviour that follows elsewhere."""
     late = proof.late
-    if late is not None and late.tracks and late.largest and answer.status == MET:
+    if late is not None and late.tracks and late.leaders is not None and late.largest and answer.status == MET:
         why = "nothing is proved of that" if math.isinf(late.largest) else "nothing settles under a cap"
-        return Answer(OPEN, f"{answer.what} at T {_moved(proof.leaders_move)}", why)
+        return Answer(OPEN, f"{answer.what} at T {late.leaders.while_told}", why)
     if proof.asked_messages is None or answer.status != MET or proof.constant:
         return answer
     what = f"{answer.what} at T with {proof.asked_messages.name}"
@@ -231,7 +230,7 @@ def judge_rate_beside(proof: GraphProof | FamilyProof, least: Fraction, what: st
     if proof.constant or proof.agents is not None:
         return None
     if proof.asked_leaders is not None:
-        return Answer(OPEN, what, f"no rate is proved {_moved(proof.leaders_move)}")
+        return Answer(OPEN, what, f"no rate is proved {proof.asked_leaders.while_told}")
     if any(limits.sample_period is not None for limits in proof.limits):
         return Answer(OPEN, what, "no rate is proved of a gain that is held")
     if proof.asked_messages is None or (late is not None and late.direct):
@@ -242,10 +241,6 @@ def judge_rate_beside(proof: GraphProof | FamilyProof, least: Fraction, what: st
         return Answer(OPEN, what, f"no rate is proved {whose}")
     rate = 2 * late.lmi.b
     return Answer(MET if rate >= least else OPEN, what, f"with {late.messages.name} {down(rate)} is proved")
-
-
-def _moved(leaders_move: bool) -> str:
-    return "while leaders move" if leaders_move else "under disturbances"
 
 
 def judge_messages(proof: GraphProof | FamilyProof) -> list[Answer]:
@@ -323,7 +318,8 @@ def _judge_late_input(proof: GraphProof | FamilyProof, late: LateBounds, most: F
     """Tell whether every input stays within so much with late messages."""
     largest = largest_late_input(late, proof.protocol)
     if largest is None:
-        why = f"no bound is proved {_moved(proof.leaders_move) if late.tracks else f'with {late.messages.name}'}"
+        tracked = late.leaders if late.tracks else None
+        why = f"no bound is proved {tracked.while_told if tracked is not None else f'with {late.messages.name}'}"
         if late.messages.vehicles is not None:
             why = "no bound is proved of virtual positions without a cap"
         elif late.heard_right and not late.tracks:
@@ -355,10 +351,10 @@ def judge_family_behaviour(components: Sequence[FamilyComponent], expected: str)
     >>> print(judge_family_behaviour(decide(Family.from_intervals([("a", "b", 0, 1)])), "bipartite consensus"))
     bipartite consensus (held constant, the leader groups of a and b do not hear each other, and do not meet)
     """
-    answers = [component_holds(component, expected) for component in components]
+    answers = [component.holds(expected) for component in components]
     if False in answers:
         component = components[answers.index(False)]
-        why = component_refutation(component, expected)
+        why = component.refutation(expected)
         other = f"it is {component.behaviour}"
         return Answer(REFUTED, expected, other if why is None else counterexample_text(component, why))
     return Answer(OPEN, expected, "not decided") if None in answers else Answer(MET, expected)

@@ -7,17 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from lmi.exact.decimal_rounding import counted
-from ptcc_certify.cli.click_options import (
-    A0,
-    DIMENSION,
-    click_option,
-    exact_number,
-    flag_of,
-    names_of,
-    one_of,
-    options_for,
-    together,
-)
+from ptcc_certify.cli import click_options as declared
 from ptcc_certify.cli.options import Options, read_initial_state
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
@@ -41,11 +31,11 @@ NAMES = {"integrator": 1, "double-integrator": 2, "triple-integrator": 3}
 #: The largest order, which the library refuses to exceed.
 _MOST_ORDER = 8
 #: Options that need ``--agents``.
-_OWN = (*names_of(Agents)[1:], "v0", "a0")
+_OWN = (*declared.names_of(Agents)[1:], "v0", "a0")
 
 #: Where double integrators may do so, and what is proved of those that do.
 _EXCHANGE = "let them exchange virtual positions: --exchange virtual; or"
-_OF_VEHICLES = {*names_of(LateMessages), *names_of(MovingLeaders)} - {"own_delay", "sign_gain"}
+_OF_VEHICLES = {*declared.names_of(LateMessages), *declared.names_of(MovingLeaders)} - {"own_delay", "sign_gain"}
 #: What is said where late messages are asked of agents of order n; then what makes them such is named.
 _MESSAGES = "late messages are proved of single integrators and of virtual positions: leave it out, or leave out"
 #: Options that are of single integrators alone, and what to do instead.
@@ -55,13 +45,15 @@ _OF_SINGLE_INTEGRATORS = {
     "noise": "leave it out",
     "at": "leave it out; -v tells bounds at several instants",
     "initial_bound": "give the initial state with --x0 instead",
-    **dict.fromkeys([name for name in names_of(LateMessages) if name != "own_delay"], _MESSAGES),
-    **dict.fromkeys(names_of(MovingLeaders), "leave it out; their leaders move as their plant does"),
+    **dict.fromkeys([name for name in declared.names_of(LateMessages) if name != "own_delay"], _MESSAGES),
+    **dict.fromkeys(declared.names_of(MovingLeaders), "leave it out; their leaders move as their plant does"),
 }
 
-agents_options = together(options_for(Agents, asked=True), one_of(InitialState, "v0"), click_option(A0))
+agents_options = declared.together(
+    declared.options_for(Agents, asked=True), declared.one_of(InitialState, "v0"), declared.click_option(declared.A0)
+)
 #: Of commands that take vectors of agents of order n alone.
-dimension_option = click_option(DIMENSION)
+dimension_option = declared.click_option(declared.DIMENSION)
 
 
 def agents_of(options: Options) -> Agents | None:
@@ -77,7 +69,7 @@ def _named_agents(options: Options) -> Agents | None:
         given = [name for name in _OWN if options[name] is not None]
         if given and not {"offsets", "biases"} & set(given):
             named = "triple-integrator" if options["a0"] is not None else "double-integrator"
-            raise ParameterError(f"{flag_of(given[0])}: is for agents of order n; give --agents {named}, say")
+            raise ParameterError(f"{declared.flag_of(given[0])}: is for agents of order n; give --agents {named}, say")
         if not given:
             return None
         kind = "integrator"
@@ -87,12 +79,12 @@ def _named_agents(options: Options) -> Agents | None:
         raise ParameterError(f'--agents: "{shorten(kind)}" is unknown; one of {named}')
     plant = None
     if options["plant"] is not None:
-        plant = [exact_number(text, "--plant") for text in options["plant"].split(",")]
+        plant = [declared.exact_number(text, "--plant") for text in options["plant"].split(",")]
     numbers = {name: options[name] for name in ("drag", "rest", "cascade", "decay", "exchange")}
     for least, (name, quantity) in enumerate((("v0", "velocity"), ("a0", "acceleration")), start=2):
         if options[name] is not None and options[name].strip() != "0" and int(order) < least:
             why = f"agents of order {order} have no {quantity} to begin with"
-            raise ParameterError(f"{flag_of(name)}: {why}; leave it out, or give --agents {least}")
+            raise ParameterError(f"{declared.flag_of(name)}: {why}; leave it out, or give --agents {least}")
     return Agents(
         int(order), plant, offsets=options["offsets"], biases=options["biases"], gain_cap=options["gain_cap"], **numbers
     )
@@ -164,7 +156,7 @@ def exchanges_virtual(options: Options) -> bool:
 
 def agents_flags(options: Options) -> str:
     """Return the options without which agents are single integrators, as they were given."""
-    return " and ".join(flag_of(name) for name in ("agents", *_OWN) if options[name] is not None)
+    return " and ".join(declared.flag_of(name) for name in ("agents", *_OWN) if options[name] is not None)
 
 
 def refuse_agents_of_family(options: Options, verb: str) -> None:
@@ -197,7 +189,7 @@ def _refuse_unproved(options: Options, certified: bool) -> None:
     given = [name for name in _OF_SINGLE_INTEGRATORS if options.get(name) is not None]
     if given:
         mend = _OF_SINGLE_INTEGRATORS[given[0]]
-        flags = [flag_of(name) for name in given if _OF_SINGLE_INTEGRATORS[name] == mend]
+        flags = [declared.flag_of(name) for name in given if _OF_SINGLE_INTEGRATORS[name] == mend]
         mend += f" {agents_flags(options)}" if mend == _MESSAGES else ""
         if certified and set(given) <= _OF_VEHICLES and _may_exchange(options):
             mend = f"{_EXCHANGE} leave it out"
@@ -257,5 +249,5 @@ def read_vectors(text: str, seed: Any, graph: SignedDigraph, dimension: int, nam
             f"{name} has {counted(len(texts), 'value')} for {counted(graph.n_nodes, 'agent')} of dimension "
             f"{dimension}; give {graph.n_nodes * dimension} numbers, agent after agent, or a file node,x,y"
         )
-    numbers = [exact_number(text, name) for text in texts]
+    numbers = [declared.exact_number(text, name) for text in texts]
     return [numbers[k : k + dimension] for k in range(0, len(numbers), dimension)]

@@ -10,33 +10,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from lmi.exact.decimal_rounding import down
+from ptcc_certify.cli import agents as of_agents
+from ptcc_certify.cli import families
+from ptcc_certify.cli import messages_and_leaders as asked
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.agents import (
-    NAMES,
-    agents_and_states,
-    agents_options,
-    dimension_option,
-    refuse_agents_of_family,
-    refuse_dimension,
-)
 from ptcc_certify.cli.click_options import Command, one_of
-from ptcc_certify.cli.families import (
-    asked_signal,
-    decided_alone,
-    family_options,
-    names_of_family,
-    read_graph_or_family,
-    refuse_restricted,
-    restricted_options,
-)
-from ptcc_certify.cli.messages_and_leaders import (
-    leader_options,
-    leaders_of,
-    message_options,
-    messages_of,
-    noted_delays,
-    refuse_unheard,
-)
 from ptcc_certify.cli.scenario import scenario_record
 from ptcc_certify.cli.terminal import LOG, Screen, in_flags, print_json, progress, refuse_output, screen_options
 from ptcc_certify.errors import one_line
@@ -59,19 +37,19 @@ if TYPE_CHECKING:
 @shared.json_option
 @screen_options
 @shared.reading_options
-@family_options
-@restricted_options
+@families.family_options
+@families.restricted_options
 @shared.expect_option("E.g. bipartite-consensus; exit code 3 if it does not follow.")
 @one_of(Expectations, "min_rate")
 @one_of(Expectations, "max_input")
 @one_of(Asks, "at")
 @shared.method_option
 @shared.limit_options
-@agents_options
-@message_options
-@leader_options
+@of_agents.agents_options
+@asked.message_options
+@asked.leader_options
 @one_of(Expectations, "max_residual")
-@dimension_option
+@of_agents.dimension_option
 @shared.initial_bound_option
 @one_of(Asks, "noise")
 @one_of(Asks, "simulation")
@@ -92,24 +70,25 @@ def certify(graph: tuple[str, ...], output: str | None, as_json: bool, screen: S
     from ptcc_certify.report.facts.of_certificate import facts_of
 
     refuse_output(output)
-    protocol, given = shared.protocol_of(options), read_graph_or_family(graph, options)
+    protocol, given = shared.protocol_of(options), families.read_graph_or_family(graph, options)
     family = given if isinstance(given, Family) else None
     if family is not None:
-        refuse_agents_of_family(options, "certify")
-    refuse_dimension(options, "certify")
+        of_agents.refuse_agents_of_family(options, "certify")
+    of_agents.refuse_dimension(options, "certify")
     if family is None:
-        refuse_restricted(options)
+        families.refuse_restricted(options)
         signal: SignalClass = "any"
     else:
-        signal = asked_signal(family, protocol, options)
+        signal = families.asked_signal(family, protocol, options)
     size = repr(given) if isinstance(given, Family) else f"{given.n_nodes} nodes, {given.n_edges} edges"
     LOG.info("%s", one_line(f"read {', '.join(graph)}: {size}"))
-    if family is not None and (code := decided_alone(graph, family, output, as_json, screen, options)) is not None:
-        return code
+    alone = None if family is None else families.decided_alone(graph, family, output, as_json, screen, options)
+    if alone is not None:
+        return alone
     case = _case_of(graph, given, signal, protocol, options)
     name, origins = graph[0], _origins(options, family is None)
     if family is not None:
-        name, read = names_of_family(graph, family, options)
+        name, read = families.names_of_family(graph, family, options)
         origins = {"read": read, **origins}
     steps = graph_certification.STEPS if family is None else family_certification.STEPS
     with progress(steps, screen.quiet) as begin:
@@ -150,7 +129,7 @@ def _case_of(
     one, asks = given.modes[0].mandatory if isinstance(given, Family) else given, shared.asks_of(options)
     disturbance = None if family else shared.disturbance_of(protocol, options, one)
     sigma0 = shared.sigma0_of(protocol, options, one)
-    agents, initial = agents_and_states(options, one, certified=True)
+    agents, initial = of_agents.agents_and_states(options, one, certified=True)
     if initial is None:
         initial = InitialState(shared.read_initial_state(options["x0"], options["seed"], one))
     limits = shared.limits_of(options) if options["kind"] == "nominal" else ()
@@ -159,12 +138,12 @@ def _case_of(
         agents, limits = (replace(agents, gain_cap=None), limits) if more else (agents, ())
         disturbance = disturbance if more or agents.of_paper else None
     if not family:
-        refuse_unheard(one, options)
-    messages, leaders = messages_of(graphs, given, options), leaders_of(options)
+        asked.refuse_unheard(one, options)
+    messages, leaders = asked.messages_of(graphs, given, options), asked.leaders_of(options)
     if family and messages is not None:
         limits = ()  # a cap is theirs
     if isinstance(given, Family) and messages is not None and isinstance(messages.delay, Mapping):
-        given = replace(given, notes=noted_delays(given.notes, options["delay"]))
+        given = replace(given, notes=asked.noted_delays(given.notes, options["delay"]))
     if options["kind"] == "nominal":
         asks = replace(asks, noise=options["noise"], delta=options["delta"] if leaders is None else None)
     asks, initial = replace(asks, disturbance=disturbance), replace(initial, sigma0=sigma0)
@@ -176,7 +155,7 @@ def _origins(options: shared.Options, alone: bool) -> dict[str, str]:
     """Return which of ``x(0)`` and ``sigma(0)`` were drawn, and with which seed; of one graph ``alone`` also 0."""
     states = {"x(0)": options["x0"], "sigma(0)": options["sigma0"], "v(0)": options["v0"], "a(0)": options["a0"]}
     drawn = {name: f"random, seed {options['seed']}" for name, text in states.items() if text == "random"}
-    moved = ("v(0)", "a(0)")[: NAMES.get(options["agents"], 1) - 1 if alone else 0]
+    moved = ("v(0)", "a(0)")[: of_agents.NAMES.get(options["agents"], 1) - 1 if alone else 0]
     return drawn | {name: "0" for name in moved if states[name] in (None, "0")}
 
 

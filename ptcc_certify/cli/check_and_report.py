@@ -11,6 +11,7 @@ from click.core import ParameterSource
 
 from lmi.exact.decimal_rounding import counted
 from ptcc_certify.cli import options as shared
+from ptcc_certify.cli.click_options import flag_of
 from ptcc_certify.cli.families import mode_options
 from ptcc_certify.cli.same_graph import READING, compare
 from ptcc_certify.cli.scenario import graph_of
@@ -61,7 +62,7 @@ def check(
     source = click.get_current_context().get_parameter_source
     given = [name for name in READING if source(name) is ParameterSource.COMMANDLINE]
     if given and not graph:
-        raise ParameterError(f"{shared.flag_of(given[0])} tells how a graph is read; name it: ptcc check CERT GRAPH")
+        raise ParameterError(f"{flag_of(given[0])} tells how a graph is read; name it: ptcc check CERT GRAPH")
     report: CheckReport
     with progress(("independent check",), screen.quiet) as begin:
         begin("independent check")

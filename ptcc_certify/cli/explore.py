@@ -30,7 +30,7 @@ def explore(graph: str, port: int, no_browser: bool, **options: Any) -> int:
     once the address is printed.
     """
     from ptcc_certify.report.explorer.model import Explorer
-    from ptcc_certify.report.explorer.reproduction import reading_of
+    from ptcc_certify.report.explorer.question import reading_of
     from ptcc_certify.report.explorer.server import open_server
     from ptcc_certify.report.explorer.settings import Settings
 

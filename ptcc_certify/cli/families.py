@@ -18,13 +18,7 @@ from ptcc_certify.errors import ExitCode, ParameterError, one_line
 from ptcc_certify.graphs.declared_option import options_of
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import OPTIONAL, UNCERTAINTY
-from ptcc_certify.model.constrained_switching import (
-    CLOCK_DWELL,
-    WINDOWS_OF_TIME,
-    ClockShares,
-    DwellTime,
-    JointWindows,
-)
+from ptcc_certify.model.constrained_switching import CLOCK_DWELL, WINDOWS_OF_TIME, ClockShares, DwellTime, JointWindows
 from ptcc_certify.model.refusals import NOT_OF_FAMILIES
 
 if TYPE_CHECKING:

@@ -15,27 +15,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from lmi.exact.decimal_rounding import counted
-from ptcc_certify.cli.click_options import (
-    IN_LIBRARY,
-    KIND,
-    OF_PROTOCOL,
-    Command,
-    Decorator,
-    exact_number,
-    flag_of,
-    given_of,
-    names_of,
-    one_of,
-    options_for,
-    together,
-)
-from ptcc_certify.cli.scenario import (
-    graph_of,
-    is_scenario,
-    kind_of_protocol,
-    read_scenario,
-    takes_one_graph,
-)
+from ptcc_certify.cli import click_options as declared
+from ptcc_certify.cli.scenario import graph_of, is_scenario, kind_of_protocol, read_scenario, takes_one_graph
 from ptcc_certify.errors import Change, ParameterError
 from ptcc_certify.graphs.declared_option import options_of
 from ptcc_certify.graphs.reading import Reading, option_flags
@@ -55,7 +36,7 @@ if TYPE_CHECKING:
 Options = Mapping[str, Any]
 
 #: Options that tell how a graph is read, and limits of the gain, by the names of their parameters.
-READING, LIMITS = names_of(Reading), names_of(GainLimits)
+READING, LIMITS = declared.names_of(Reading), declared.names_of(GainLimits)
 #: What is told of a file that was asked for where nothing is certified.
 NOTHING_WRITTEN = "note       nothing is certified, and nothing was written"
 
@@ -73,7 +54,7 @@ def with_flags(command: click.Command, error: ParameterError) -> ParameterError:
     flags = {p.name: p.opts[0] for p in command.params if isinstance(p, click.Option)}
 
     def flag(change: Change) -> str:
-        name = IN_LIBRARY.get(change.field, change.field)
+        name = declared.IN_LIBRARY.get(change.field, change.field)
         return f"{flags[name]} {change.number}".rstrip() if name in flags else str(change)
 
     return ParameterError(error.told(flag))
@@ -116,12 +97,12 @@ def _certificate_output(context: click.Context, parameter: click.Parameter, outp
     return output
 
 
-def expect_option(text: str) -> Decorator:
+def expect_option(text: str) -> declared.Decorator:
     """Return the option that names the behaviour that is asked for."""
-    return one_of(Expectations, "behaviour", callback=_behaviour, help=text)
+    return declared.one_of(Expectations, "behaviour", callback=_behaviour, help=text)
 
 
-reading_options = options_for(Reading)
+reading_options = declared.options_for(Reading)
 #: GRAPH, or SCENARIO.toml, whose other keys become defaults of the options; hence it is read before these.
 graph_argument = click.argument(
     "graph", metavar="GRAPH|SCENARIO.toml", is_eager=True, callback=graph_of, type=click.Path()
@@ -139,27 +120,27 @@ graphs_argument = click.argument(
 certificate_argument = click.argument("certificate", callback=_certificate, type=click.Path())
 
 
-def kind_option(text: str) -> Decorator:
+def kind_option(text: str) -> declared.Decorator:
     """Return the option that tells the protocol; it comes before the others, which may be of one protocol alone."""
-    told = replace(KIND, help=text)
+    told = replace(declared.KIND, help=text)
     more: dict[str, Any] = {"type": click.Choice(list(told.choices)), "default": told.default, "help": told.help}
     return click.option(told.flag, told.name, is_eager=True, callback=kind_of_protocol, **more)
 
 
-protocol_options = together(
-    kind_option(KIND.help),
-    options_for(NominalProtocol),
-    one_of(InitialState, "x0", default="random"),
-    one_of(Run, "seed"),
-    options_for(SlidingModeProtocol),
-    one_of(Asks, "disturbance"),
-    one_of(InitialState, "sigma0"),
+protocol_options = declared.together(
+    kind_option(declared.KIND.help),
+    declared.options_for(NominalProtocol),
+    declared.one_of(InitialState, "x0", default="random"),
+    declared.one_of(Run, "seed"),
+    declared.options_for(SlidingModeProtocol),
+    declared.one_of(Asks, "disturbance"),
+    declared.one_of(InitialState, "sigma0"),
 )
-limit_options = options_for(GainLimits)
-method_option = one_of(Asks, "method")
-initial_bound_option = one_of(Asks, "initial_set")
+limit_options = declared.options_for(GainLimits)
+method_option = declared.one_of(Asks, "method")
+initial_bound_option = declared.one_of(Asks, "initial_set")
 #: Of a scenario, for commands that only draw x(0): where it is random, it begins within the set.
-random_within_option = one_of(Asks, "initial_set", hidden=True)
+random_within_option = declared.one_of(Asks, "initial_set", hidden=True)
 memory_option = click.option(
     "--memory",
     type=click.FloatRange(min=0, min_open=True, max=1000),
@@ -170,7 +151,7 @@ memory_option = click.option(
 time_unit_option = click.option(
     "--time-unit", metavar="UNIT", default="", show_default=False, help="Of time on the axes of figures, such as s."
 )
-time_limit_option = one_of(Asks, "time_limit")
+time_limit_option = declared.one_of(Asks, "time_limit")
 output_option = click.option(
     "-o",
     "--output",
@@ -180,10 +161,10 @@ output_option = click.option(
 )
 
 
-class OneGraph(Command):
+class OneGraph(declared.Command):
     """A command about one graph, which says so if it is given several."""
 
-    first = (*Command.first, "max_input", "initial_bound", "deadline", "shortest_deadline", "residual")
+    first = (*declared.Command.first, "max_input", "initial_bound", "deadline", "shortest_deadline", "residual")
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Return what is left of the arguments: nothing."""
@@ -248,11 +229,11 @@ def protocol_of(options: Options, disturbed: tuple[str, ...] = ("delta",)) -> Pr
     """Return the protocol; ``disturbed`` are the options about disturbances that the nominal one takes too."""
     nominal = options["kind"] == "nominal"
     other = "sliding-mode" if nominal else "nominal"
-    foreign = (*OF_PROTOCOL["sliding-mode"], "delta") if nominal else OF_PROTOCOL["nominal"]
+    foreign = (*declared.OF_PROTOCOL["sliding-mode"], "delta") if nominal else declared.OF_PROTOCOL["nominal"]
     for name in foreign:
         if options.get(name) is not None and name not in disturbed:
             mend = "the deadline is --T-r plus --T-s" if name == "T" else "leave it out or change the protocol"
-            raise ParameterError(f"{flag_of(name)} belongs to --protocol {other}; {mend}")
+            raise ParameterError(f"{declared.flag_of(name)} belongs to --protocol {other}; {mend}")
     kind = NominalProtocol if nominal else SlidingModeProtocol
     given = {field.name: options[field.name] for field in fields(kind)}
     return kind(**{name: value for name, value in given.items() if value is not None})
@@ -263,8 +244,9 @@ def asks_of(options: Options) -> Asks:
     most = options["max_input"]
     if most is not None and most <= 0:
         raise ParameterError("--max-input is outside its domain; it must be > 0")
-    asks = {field: value for field, value in given_of(Asks, options).items() if field not in ("noise", "disturbance")}
-    return Asks(**asks, expectations=Expectations(**given_of(Expectations, options)))
+    given = declared.given_of(Asks, options)
+    asks = {field: value for field, value in given.items() if field not in ("noise", "disturbance")}
+    return Asks(**asks, expectations=Expectations(**declared.given_of(Expectations, options)))
 
 
 def sigma0_of(protocol: Protocol, options: Options, graph: SignedDigraph) -> list[Fraction] | None:
@@ -327,24 +309,3 @@ def read_initial_state(
         scale = Fraction(1) if within is None else min(Fraction(1), abs(within) / 10)
         return [scale * x for (x,) in random_states(seed, graph.n_nodes)]
     return read_state(x0, graph, name)
-
-
-def read_initial_states(options: Options, graph: SignedDigraph) -> Any:
-    """Return the initial states of agents of ``--dimension`` components, one column for each."""
-    import numpy as np
-
-    from ptcc_certify.graphs.io import random_states
-
-    x0, seed, dimension = options["x0"], options["seed"], options["dimension"]
-    n = graph.n_nodes
-    if dimension == 1:
-        return read_initial_state(x0, seed, graph, within=options["initial_bound"])
-    if x0 == "random":
-        return random_states(seed, n, dimension)
-    texts = x0.split(",")
-    if len(texts) != n * dimension:
-        raise ParameterError(
-            f"--x0 has {counted(len(texts), 'value')} for {counted(n, 'agent')} of dimension {dimension}; "
-            f"give {n * dimension} numbers, agent after agent"
-        )
-    return np.array([exact_number(text, "--x0") for text in texts]).reshape(n, dimension)

@@ -9,19 +9,10 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+from ptcc_certify.cli import agents as of_agents
+from ptcc_certify.cli import families
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.agents import (
-    agents_and_states,
-    agents_of,
-    agents_options,
-    dimension_option,
-    places_of,
-    refuse_agents_of_family,
-    refuse_dimension,
-    run_in_places,
-)
 from ptcc_certify.cli.click_options import Command
-from ptcc_certify.cli.families import mode_options, read_graph_or_family, refuse_options
 from ptcc_certify.cli.scenario import MEMORY, graph_of, refuse_beside
 from ptcc_certify.cli.terminal import FIGURES, print_lines, progress, refuse_output
 from ptcc_certify.errors import ExitCode, ParameterError
@@ -86,12 +77,12 @@ class _Figure(click.Choice):  # type: ignore[type-arg]  # no generic class befor
 @click.option("--wide", is_flag=True, help="As wide as two columns of a journal (states).")
 @shared.time_unit_option
 @shared.reading_options
-@mode_options
+@families.mode_options
 @shared.protocol_options
 @shared.limit_options
 @shared.random_within_option
-@agents_options
-@dimension_option
+@of_agents.agents_options
+@of_agents.dimension_option
 @shared.method_option
 @shared.time_limit_option
 @shared.memory_option
@@ -118,7 +109,7 @@ def plot(
     if what in OF_A_CERTIFICATE and not certified:
         flag = "--delay" if what == "late" else "--leader-speed"
         raise ParameterError(f"--what {what} is of a certificate; make one with ptcc certify GRAPH {flag} .. -o c.json")
-    refuse_dimension(options, "plot")
+    of_agents.refuse_dimension(options, "plot")
     try:
         if certified:
             what, subject = _of_certificate(graph[0], what, options)
@@ -191,7 +182,7 @@ def _of_graphs(graphs: tuple[str, ...], what: str, options: shared.Options) -> A
     """Return what the figure of a graph, or of a family, is drawn from."""
     from ptcc_certify.graphs.family import Family
 
-    given = read_graph_or_family(graphs, options)
+    given = families.read_graph_or_family(graphs, options)
     return _of_family(given, what, options) if isinstance(given, Family) else _of_graph(given, what, options)
 
 
@@ -200,8 +191,8 @@ def _of_family(family: Family, what: str, options: shared.Options) -> Family | C
     from ptcc_certify.certificate.certification import certify_case
     from ptcc_certify.certificate.family_certification import STEPS
 
-    refuse_options(options)
-    refuse_agents_of_family(options, "draw")
+    families.refuse_options(options)
+    of_agents.refuse_agents_of_family(options, "draw")
     if what in OF_AGENTS:
         raise ParameterError(f"--what {what}: is of agents of order n; ask for another figure, or draw one graph")
     given = click.get_current_context().get_parameter_source("disturbance") is ParameterSource.COMMANDLINE
@@ -231,8 +222,8 @@ def _of_graph(
     if what in ("graph", "spectrum"):
         return signed, protocol
     refuse_beside(click.get_current_context().meta.get(MEMORY), f"plot --what {what}")
-    places = None if what == "formation" else places_of(options, signed, protocol)
-    if places is None and (what in OF_AGENTS or agents_of(options) is not None):
+    places = None if what == "formation" else of_agents.places_of(options, signed, protocol)
+    if places is None and (what in OF_AGENTS or of_agents.agents_of(options) is not None):
         return _of_agents(signed, protocol, what, options)
     x0 = shared.read_initial_state(options["x0"], options["seed"], signed, within=options["initial_bound"])
     if what == "decay":
@@ -250,7 +241,7 @@ def _of_graph(
             return certify_case(Case(signed, protocol, initial, agents=agents, asks=asks), progress=begin)  # type: ignore[return-value]
     with progress(("simulation",)) as begin:
         begin("simulation")
-        return run_in_places(signed, protocol, x0, places, **shared.run_keywords(protocol, options, signed))
+        return of_agents.run_in_places(signed, protocol, x0, places, **shared.run_keywords(protocol, options, signed))
 
 
 def _of_agents(signed: SignedDigraph, protocol: Protocol, what: str, options: shared.Options) -> Certificate:
@@ -258,7 +249,7 @@ def _of_agents(signed: SignedDigraph, protocol: Protocol, what: str, options: sh
     from ptcc_certify.certificate.certification import certify_case
     from ptcc_certify.certificate.graph_certification import STEPS
 
-    agents, initial = agents_and_states(options, signed)
+    agents, initial = of_agents.agents_and_states(options, signed)
     if initial is None:
         raise ParameterError(f"--what {what}: is of agents of order n; add --agents double-integrator, say")
     drawn = (*OF_AGENTS, *_SHARED)

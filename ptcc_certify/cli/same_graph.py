@@ -14,6 +14,7 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
+from ptcc_certify.cli.click_options import flag_of
 from ptcc_certify.cli.families import family_keywords, files_of, graph_or_family
 from ptcc_certify.errors import PTCCError
 from ptcc_certify.graphs.recognised_files import shell_word
@@ -186,7 +187,7 @@ def _flags(options: shared.Options, told: shared.Options, file: Any) -> str:
     direction = "listens" if name_and_ending(file)[1] in MATRICES else "information"
     words = []
     for name in READING:
-        flag = shared.flag_of(name)
+        flag = flag_of(name)
         old, new = options[name], told[name]
         if name == "edges":
             old, new = old or direction, new or direction

@@ -11,34 +11,11 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+from ptcc_certify.cli import agents as of_agents
+from ptcc_certify.cli import families
+from ptcc_certify.cli import messages_and_leaders as asked
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.agents import (
-    agents_and_states,
-    agents_flags,
-    agents_of,
-    agents_options,
-    exchanges_virtual,
-    places_of,
-    refuse_agents_of_family,
-    run_in_places,
-    run_of_agents,
-)
 from ptcc_certify.cli.click_options import DIMENSION, SIGNAL, Command, click_option, flag_of, one_of
-from ptcc_certify.cli.families import (
-    dwell_of,
-    dwell_options,
-    mode_options,
-    read_graph_or_family,
-    refuse_options,
-    refuse_restricted,
-)
-from ptcc_certify.cli.messages_and_leaders import (
-    asks_for_messages,
-    leader_options,
-    leaders_of,
-    message_options,
-    messages_of,
-)
 from ptcc_certify.cli.scenario import BESIDE
 from ptcc_certify.cli.terminal import FIGURES, print_lines, refuse_output
 from ptcc_certify.errors import ExitCode, ParameterError
@@ -69,8 +46,8 @@ _TABLES = ("", ".csv", ".txt")
 @shared.protocol_options
 @shared.limit_options
 @shared.random_within_option
-@mode_options
-@dwell_options
+@families.mode_options
+@families.dwell_options
 @click_option(
     SIGNAL,
     flag="--signal SIGNAL",
@@ -78,11 +55,11 @@ _TABLES = ("", ".csv", ".txt")
     default="random",
     help="Family: random (with --seed), worst-case, constant, or FILE.csv with columns t (or clock), mode, level.",
 )
-@agents_options
+@of_agents.agents_options
 @shared.method_option
-@message_options
+@asked.message_options
 @one_of(Run, "pattern")
-@leader_options
+@asked.leader_options
 @click_option(DIMENSION, default=1, help="State components per agent.")
 @one_of(Run, "samples")
 @one_of(Run, "steps")
@@ -118,26 +95,27 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
 
     suffix, vectors = Path(output or "").suffix.lower(), options["dimension"] > 1
     given = click.get_current_context().get_parameter_source("age_pattern") is ParameterSource.COMMANDLINE
-    if given and not asks_for_messages(options):
+    if given and not asked.asks_for_messages(options):
         raise ParameterError("--pattern says how late messages are; add --delay, --period or --quantisation")
     if suffix not in (*FIGURES, *_TABLES):
         raise ParameterError(f"{output}: CSV is written to .csv, figures to {', '.join(FIGURES)}; choose one of these")
     refuse_output(output)
-    protocol, signed = shared.protocol_of(options, ("delta", "disturbance")), read_graph_or_family(graph, options)
+    protocol = shared.protocol_of(options, ("delta", "disturbance"))
+    signed = families.read_graph_or_family(graph, options)
     if isinstance(signed, Family):
-        refuse_agents_of_family(options, "simulate")
-    special = agents_of(options) is not None
+        of_agents.refuse_agents_of_family(options, "simulate")
+    special = of_agents.agents_of(options) is not None
     if suffix in FIGURES and vectors and not special:
         raise ParameterError("a figure shows one component per agent; leave out --dimension or write CSV")
     if vectors and options["kind"] != "nominal" and not special:
         raise ParameterError("the sliding-mode protocol is simulated for scalar agents; leave out --dimension")
-    places = None if isinstance(signed, Family) else places_of(options, signed, protocol)
+    places = None if isinstance(signed, Family) else of_agents.places_of(options, signed, protocol)
     special = special and places is None
     if isinstance(signed, Family):
         _refuse_messages(options, "families of graphs")
     elif special:
         motion = _run_agents(graph[0], signed, protocol, options)
-        _write(motion, output, "agents_motion.plot_motion", {"wide": wide, "time_unit": time_unit})
+        _write(motion, output, "motion.plot_motion", {"wide": wide, "time_unit": time_unit})
         if protocol.reaching is not None:
             click.echo("note: u is without the sliding terms, which cancel the disturbance", err=True)
         return ExitCode.OK
@@ -175,8 +153,8 @@ def _run_agents(graph: str, signed: SignedDigraph, protocol: Protocol, options: 
     """Return the run of agents of order n."""
     source, asks = click.get_current_context().get_parameter_source, Asks(method=options["method"], simulation=False)
     beside: dict[str, Any] = {}
-    if exchanges_virtual(options):  # what is asked of these is judged in one place
-        messages, leaders = messages_of((graph,), signed, options), leaders_of(options)
+    if of_agents.exchanges_virtual(options):  # what is asked of these is judged in one place
+        messages, leaders = asked.messages_of((graph,), signed, options), asked.leaders_of(options)
         limits = [limit for limit in shared.limits_of(options) if limit.stop_before or limit.sample_period]
         beside = {"messages": messages, "leaders": leaders, "limits": limits}
         asks = replace(asks, noise=options["noise"], delta=options["delta"] if leaders is None else None)
@@ -186,17 +164,17 @@ def _run_agents(graph: str, signed: SignedDigraph, protocol: Protocol, options: 
         _refuse_messages(options, "agents of order n")
     for name in ("steps", "boundary_layer"):
         if options[name] is not None:
-            mend = f"leave it out, or leave out {agents_flags(options)}"
+            mend = f"leave it out, or leave out {of_agents.agents_flags(options)}"
             raise ParameterError(f"{flag_of(name)}: is for single integrators; {mend}")
     if options["kind"] == "nominal" and options["disturbance"] is not None:
         raise ParameterError("--disturbance: agents of order n run without, or under --protocol sliding-mode")
     if source("signal") == ParameterSource.COMMANDLINE:
         raise ParameterError("--signal: is for families of graphs; this is one graph: leave it out")
-    refuse_restricted(options)
-    agents, initial = agents_and_states(options, signed, certified=exchanges_virtual(options))
+    families.refuse_restricted(options)
+    agents, initial = of_agents.agents_and_states(options, signed, certified=of_agents.exchanges_virtual(options))
     begin = replace(initial or InitialState(), sigma0=shared.sigma0_of(protocol, options, signed))
     case = Case(signed, protocol, begin, agents=agents, asks=asks, **beside)
-    return run_of_agents(case, options["samples"], pattern=options["age_pattern"], seed=options["seed"])
+    return of_agents.run_of_agents(case, options["samples"], pattern=options["age_pattern"], seed=options["seed"])
 
 
 def _refuse_messages(options: shared.Options, what: str) -> None:
@@ -210,7 +188,7 @@ def _run_beside(
     graph: str, signed: SignedDigraph, protocol: Protocol, options: shared.Options, places: Sequence[Fraction] | None
 ) -> Trajectory | None:
     """Return the run with late messages or leaders that move; None if nothing is asked of them."""
-    messages, leaders = messages_of((graph,), signed, options), leaders_of(options)
+    messages, leaders = asked.messages_of((graph,), signed, options), asked.leaders_of(options)
     if messages is None and leaders is None:
         return None
     if leaders is None and protocol.reaching is None and options["delta"]:
@@ -226,7 +204,7 @@ def _run_beside(
         given.append("dimension")
     if given:
         raise ParameterError(f"{flag_of(given[0])}: is not simulated with {name}; leave it out")
-    refuse_restricted(options)
+    families.refuse_restricted(options)
     sigma0 = shared.sigma0_of(protocol, options, signed)
     x0 = shared.read_initial_state(options["x0"], options["seed"], signed)
     more: Any = {"messages": messages, "leaders": leaders}
@@ -234,7 +212,7 @@ def _run_beside(
         more["signal"] = (options["age_pattern"], options["seed"])
     elif options["gain_cap"] is not None:
         more["actuator"] = GainLimits(gain_cap=options["gain_cap"])
-    return run_in_places(signed, protocol, x0, places, sigma0=sigma0, **more)
+    return of_agents.run_in_places(signed, protocol, x0, places, sigma0=sigma0, **more)
 
 
 def _run(
@@ -249,14 +227,18 @@ def _run(
         return _run_family(signed, protocol, times, options)
     if click.get_current_context().get_parameter_source("signal") == ParameterSource.COMMANDLINE:
         raise ParameterError("--signal is for families (--switching, --uncertainty, intervals); this is one graph")
-    refuse_restricted(options)
+    families.refuse_restricted(options)
     more = shared.run_keywords(protocol, options, signed) | {n: options[n] for n in ("samples", "boundary_layer")}
     if options["noise"] is not None:
         from ptcc_certify.simulation.nominal import Bounded
 
         more["noise"] = Bounded("telegraph", options["noise"])
-    x0 = shared.read_initial_states(options, signed)
-    return run_in_places(signed, protocol, x0, places, times=times, **more)
+    x0, seed = options["x0"], options["seed"]
+    if options["dimension"] == 1:
+        x0 = shared.read_initial_state(x0, seed, signed, within=options["initial_bound"])
+    else:
+        x0 = of_agents.read_vectors(x0, seed, signed, options["dimension"], "--x0")
+    return of_agents.run_in_places(signed, protocol, x0, places, times=times, **more)
 
 
 def _run_family(
@@ -266,13 +248,13 @@ def _run_family(
     from ptcc_certify.simulation.run import simulate
     from ptcc_certify.simulation.switching_signals import RandomDwellSignal, as_signal
 
-    refuse_options(options)
+    families.refuse_options(options)
     if options["dimension"] > 1 or options["boundary_layer"] is not None:
         flag = "--dimension" if options["dimension"] > 1 else "--boundary-layer"
         raise ParameterError(f"{flag} is for one graph, not for families yet; leave it out")
     signal = "random" if options["signal"] == "any" else options["signal"]  # of a scenario for ptcc certify
     x0 = shared.read_initial_state(options["x0"], options["seed"], family.modes[0].mandatory)
-    promise = dwell_of(options)
+    promise = families.dwell_of(options)
     if promise is not None and signal != "random":
         flag = "--dwell" if options["dwell"] is not None else "--clock-dwell"
         raise ParameterError(f"{flag} is of random signals; leave it out, or leave out --signal {shorten(signal)}")

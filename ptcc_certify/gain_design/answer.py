@@ -118,7 +118,7 @@ class DesignAnswer(Shown):
         """What is proved of input and deviation at the deadline, in one line; empty without gains."""
         if self.peak is None or self.residual is None:
             return ""
-        return f"{self.size} <= {up(self.peak)}, {self.ends_text(self.residual)} at T"
+        return f"{self.size} <= {up(self.peak)}, {self.ends_text} at T"
 
     @property
     @abstractmethod
@@ -130,9 +130,10 @@ class DesignAnswer(Shown):
     def states_text(self) -> str:
         """The initial states."""
 
+    @property
     @abstractmethod
-    def ends_text(self, residual: Fraction) -> str:
-        """Return how near to their ends all agents are."""
+    def ends_text(self) -> str:
+        """How near to their ends all agents are."""
 
     @property
     def gains_text(self) -> str:
@@ -331,9 +332,10 @@ class Design(DesignAnswer):
         box = not any(initial_set.center) and R and min(initial_set.radius) == R
         return f"all |x_k(0)| <= {short_exact(R)}" if box else "the given initial states"
 
-    def ends_text(self, residual: Fraction) -> str:
-        """Return how near to their final states all agents are."""
-        return f"every agent {f'within {up(residual)} of' if residual else 'at'} its final state"
+    @property
+    def ends_text(self) -> str:
+        """How near to their final states all agents are."""
+        return f"every agent {f'within {up(self.residual)} of' if self.residual else 'at'} its final state"
 
     @property
     def bounds_text(self) -> str:
@@ -433,9 +435,10 @@ class AgentsDesign(DesignAnswer):
         """The initial states."""
         return "the given initial state"
 
-    def ends_text(self, residual: Fraction) -> str:
-        """Return how near to their places all agents are."""
-        return f"every position within {up(residual)} of its place" if residual else "every agent in place"
+    @property
+    def ends_text(self) -> str:
+        """How near to their places all agents are."""
+        return f"every position within {up(self.residual)} of its place" if self.residual else "every agent in place"
 
     @property
     def gains_text(self) -> str:

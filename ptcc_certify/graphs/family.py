@@ -21,11 +21,7 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import counted
 from ptcc_certify.errors import GraphError, NumberError, ParameterError, did_you_mean, gated
-from ptcc_certify.graphs.digraph import (
-    CallableTuple,
-    Exact,
-    SignedDigraph,
-)
+from ptcc_certify.graphs.digraph import CallableTuple, Exact, SignedDigraph
 from ptcc_certify.graphs.labels import import_pandas, ordered_labels, refuse_unnamed, refuse_written_twice
 from ptcc_certify.graphs.packed_weights import LARGEST_WEIGHT, SMALLEST_WEIGHT, Weights
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, nearest_float, shorten

@@ -43,7 +43,7 @@ from ptcc_certify.lyapunov.interval_rows import IntervalRows, least_quotient
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.row_decay import FollowerDecay, follower_decays, follower_nodes
 from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
-from ptcc_certify.theorems.family_kernel import UNKNOWN, Kernel, TooLarge
+from ptcc_certify.theorems.kernel import UNKNOWN, Kernel, TooLarge
 
 #: Shares of the rate of the followers that the agents they follow may take: the larger, the smaller is ``W(0)``. Above
 #: ``MANY_FOLLOWERS`` there is one function alone.

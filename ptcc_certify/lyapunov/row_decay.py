@@ -33,7 +33,7 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import analyse, find_camps
 from ptcc_certify.lyapunov.dominance import round_array
 from ptcc_certify.lyapunov.interval_rows import IntervalRows, Policy, least_quotient
-from ptcc_certify.theorems.family_kernel import reached
+from ptcc_certify.theorems.kernel import reached
 
 #: Rounds of policy iteration, and of the search for the rate.
 _ROUNDS, _TRIALS = 40, 24

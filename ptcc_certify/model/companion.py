@@ -133,20 +133,13 @@ def _uncontrollable(A: Sequence[Sequence[Fraction]], q: Sequence[Fraction]) -> s
 
 def _solve(M: Sequence[Sequence[Fraction]], right: Sequence[Fraction]) -> tuple[list[Fraction], list[Fraction] | None]:
     """Return the solution of ``M c = right`` and None; of a singular ``M`` nothing, and a vector of its kernel."""
+    import flint
+
     n = len(M)
-    rows = [[*row, x] for row, x in zip(M, right, strict=True)]
-    pivots = list[int]()
-    for j in range(n):
-        k = len(pivots)
-        place = next((i for i in range(k, n) if rows[i][j]), None)
-        if place is None:
-            continue
-        rows[k], rows[place] = rows[place], rows[k]
-        rows[k] = [x / rows[k][j] for x in rows[k]]
-        for i in range(n):
-            if i != k and rows[i][j]:
-                rows[i] = [x - rows[i][j] * y for x, y in zip(rows[i], rows[k], strict=True)]
-        pivots.append(j)
+    entries = [flint.fmpq(x.numerator, x.denominator) for row, b in zip(M, right, strict=True) for x in (*row, b)]
+    reduced, _ = flint.fmpq_mat(n, n + 1, entries).rref()
+    rows = [[Fraction(int(x.p), int(x.q)) for x in row] for row in reduced.tolist()]
+    pivots = [next(j for j, x in enumerate(row) if x) for row in rows if any(row[:n])]
     if len(pivots) == n:
         return [row[n] for row in rows], None
     free = next(j for j in range(n) if j not in pivots)

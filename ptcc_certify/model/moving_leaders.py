@@ -79,6 +79,11 @@ give 2 or more
             )
 
     @property
+    def while_told(self) -> str:
+        """During what something holds or not: while they move, or where they rest under disturbances."""
+        return "while leaders move" if self.speed else "under disturbances"
+
+    @property
     def total(self) -> Fraction:
         """``speed + disturbance``: how fast a follower and its target may part."""
         return self.speed + self.disturbance

@@ -25,8 +25,8 @@ from ptcc_certify.report.facts.graph import family_text
 from ptcc_certify.report.facts.of_certificate import facts_of
 from ptcc_certify.report.facts.of_structure import decision_facts, design_facts, structure_facts
 from ptcc_certify.report.page_figures import draw
-from ptcc_certify.report.plots.agents_motion import plot_motion
 from ptcc_certify.report.plots.graph import plot_graph
+from ptcc_certify.report.plots.motion import plot_motion
 from ptcc_certify.report.plots.style import figure_bytes
 from ptcc_certify.report.plots.trade_off import plot_trade_off
 from ptcc_certify.report.plots.trajectory import plot_run

@@ -17,12 +17,12 @@ from ptcc_certify.errors import ParameterError, SimulationError, gated, labelled
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, EXACT_NODES, TRACED_NODES
 from ptcc_certify.model.base import Protocol
 from ptcc_certify.report.html_text import set_text
-from ptcc_certify.report.plots.agents_motion import plot_formation, plot_motion
 from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.decay import NothingDecays, plot_decay
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.input import plot_input
 from ptcc_certify.report.plots.large_graphs import plot_degrees, plot_final_states
+from ptcc_certify.report.plots.motion import plot_formation, plot_motion
 from ptcc_certify.report.plots.spectrum import plot_spectrum
 from ptcc_certify.report.plots.style import figure_bytes
 from ptcc_certify.report.plots.subject import is_of_family
@@ -33,7 +33,6 @@ from ptcc_certify.simulation.late_messages import can_run
 from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.counterexample_text import counterexample_text
 from ptcc_certify.theorems.family_behaviour import DEPENDS, Counterexample, FamilyComponent
-from ptcc_certify.theorems.family_special_cases import component_holds, component_refutation
 
 #: What draws each figure of a certificate, on given axes or its own; all but the graph show its simulated run.
 PLOTS: dict[str, Callable[..., Any]] = {
@@ -175,8 +174,8 @@ def counterexamples(saved: Certificate) -> Counterexamples:
     asked = saved.expectations.behaviour
     if asked is not None and any(a.status == REFUTED for a in saved.assessment.answers):
         for part in saved.family_proof.parts:
-            if component_holds(part.component, asked) is False:
-                why = component_refutation(part.component, asked)
+            if part.component.holds(asked) is False:
+                why = part.component.refutation(asked)
                 if why is not None and why not in [one for _, _, one in result]:
                     result.append((asked, part.component, why))
                 break

@@ -16,7 +16,6 @@ from ptcc_certify.report import html_text as texts
 from ptcc_certify.report.facts.claim import assumptions
 from ptcc_certify.report.facts.constrained_switching import agreement_text, rests
 from ptcc_certify.report.html_text import above, below, enclosed, rational
-from ptcc_certify.theorems.family_special_cases import camps
 
 #: Agents up to which each has a row, and how many there are of either extreme above.
 ROWS, EXTREMES = 60, 10
@@ -124,7 +123,7 @@ def state_rows(saved: Certificate) -> list[tuple[str, str, str, str | None]]:
     labels, finals = saved.family_proof.family.labels, states_of_signal(saved.family_proof)
     camp = ["\u2013"] * len(labels)
     for part in saved.family_proof.parts:
-        for number, side in enumerate(camps(part.component), 1):
+        for number, side in enumerate(part.component.camps, 1):
             for v in part.component.nodes[side].tolist():
                 camp[v] = f"camp {number}"
     ends = [None if end is None else _ends(end) for end in finals]

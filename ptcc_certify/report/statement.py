@@ -25,7 +25,7 @@ from ptcc_certify.model.agents import plant_text
 from ptcc_certify.model.casadi_latex import symbol_latex
 from ptcc_certify.report import html_text as texts
 from ptcc_certify.report.facts.agents import claimed_of
-from ptcc_certify.report.facts.claim import assumptions, sharpest
+from ptcc_certify.report.facts.claim import assumptions
 from ptcc_certify.report.facts.constrained_switching import signal_text
 from ptcc_certify.report.facts.law import beside_law
 from ptcc_certify.report.facts.of_certificate import facts_of
@@ -147,7 +147,7 @@ def _of_family(saved: Certificate) -> dict[str, Any]:
     proof = saved.family_proof
     family, components = proof.family, [part.component for part in proof.parts]
     parameters = [(mode, mode.parameters) for mode in family.modes]  # both directions of an undirected edge are one
-    claims = Counter(map(sharpest, components))
+    claims = Counter(component.sharpest for component in components)
     heads, rows = _family_states(saved)
     return {
         **{"family": family, "several": len(family.modes) > 1, "matrix": [], "modes": _modes(family)},

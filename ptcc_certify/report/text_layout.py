@@ -1,4 +1,4 @@
-"""Text for a terminal: how many columns it takes, lists and names shortened to fit, long lines wrapped."""
+"""Text for a terminal: how many columns it takes, lists, intervals and names shortened to fit, long lines wrapped."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import unicodedata
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
 
-from lmi.exact.decimal_rounding import near
+from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.errors import LABEL, LABEL_END, labelled, unlabelled
 
 #: Columns of a screen, and of the head of a line on it, blank included.
@@ -114,6 +114,41 @@ def short_number(value: object) -> str:
         return decimal
     short = abs(value.numerator) < 1000 and value.denominator < 1000
     return str(value) if short else decimal
+
+
+def interval_text(ends: tuple[Fraction, Fraction] | None) -> str:
+    """Tell an interval, rounded outwards.
+
+    Examples
+    --------
+    >>> interval_text((Fraction(1, 3), Fraction(2, 3))), interval_text((Fraction(1), Fraction(1)))
+    ('in [0.33333, 0.66667]', 'at 1')
+    """
+    if ends is None:
+        return "no limit is claimed"
+    low, high = ends
+    return f"at {short_number(low)}" if low == high else f"in [{down(low, 5)}, {up(high, 5)}]"
+
+
+def intervals_text(labels: Sequence[str], states: Sequence[tuple[Fraction, Fraction] | None], width: int) -> str:
+    """Tell the intervals of agents, those with the same one together.
+
+    Examples
+    --------
+    >>> both = (Fraction(0), Fraction(1))
+    >>> from ptcc_certify.errors import unlabelled
+    >>> unlabelled(intervals_text(["a", "b", "c"], [both, both, None], 80))
+    'a, b in [0, 1], c no limit is claimed'
+    >>> intervals_text(["a", "b"], [both, both], 80)
+    'every agent in [0, 1]'
+    """
+    groups: dict[str, list[str]] = {}
+    for label, ends in zip(labels, states, strict=True):
+        groups.setdefault(interval_text(ends), []).append(agent_text(label))
+    if len(groups) == 1 < len(states):
+        return f"every agent {next(iter(groups))}"
+    texts = [f"{shorten_list(names, 24 if width < 4 * TEXT else 4 * TEXT)} {ends}" for ends, names in groups.items()]
+    return shorten_list(texts, width)
 
 
 def wrap_text(text: str, width: int = TEXT) -> list[str]:

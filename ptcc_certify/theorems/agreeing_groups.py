@@ -20,7 +20,7 @@ import numpy as np
 
 from ptcc_certify.graphs.structure import find_camps, weak_components
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
-from ptcc_certify.theorems.family_kernel import UNKNOWN, reached, spread
+from ptcc_certify.theorems.kernel import UNKNOWN, reached, spread
 
 
 @dataclass(frozen=True, eq=False)

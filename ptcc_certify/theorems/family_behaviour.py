@@ -31,7 +31,10 @@ from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import (
     BIPARTITE_CONSENSUS,
     BIPARTITE_CONTAINMENT,
+    CONSENSUS,
+    CONTAINMENT,
     INTERVAL_BIPARTITE_CONSENSUS,
+    SIGNED_AVERAGE_CONSENSUS,
     STABILITY,
     Edge,
     Structure,
@@ -40,7 +43,7 @@ from ptcc_certify.graphs.structure import (
     weak_components,
 )
 from ptcc_certify.lazy_report import Shown, rendered
-from ptcc_certify.theorems.family_kernel import Kernel, StateEnclosure, TooLarge, first_answer
+from ptcc_certify.theorems.kernel import Kernel, StateEnclosure, TooLarge, first_answer
 
 __all__ = ["DEPENDS", "SIGNALS", "Counterexample", "FamilyComponent", "Kernel", "TooLarge", "decide"]
 
@@ -49,6 +52,12 @@ DEPENDS = "depends on the signal"
 SIGNALS = ("any", "constant")
 #: Each implies those after it.
 CHAIN = (BIPARTITE_CONSENSUS, INTERVAL_BIPARTITE_CONSENSUS, BIPARTITE_CONTAINMENT)
+#: The behaviour of which each special case is one.
+GENERAL = {
+    CONSENSUS: BIPARTITE_CONSENSUS,
+    SIGNED_AVERAGE_CONSENSUS: BIPARTITE_CONSENSUS,
+    CONTAINMENT: BIPARTITE_CONTAINMENT,
+}
 #: Kinds of counterexamples.
 CLOSED_SET, TWO_COMPONENTS, NO_CAMPS = "balanced closed set", "two closed components", "no camps"
 DIFFERENT, MOVING, STABLE = "different kernels", "moving rest state", "stable member"
@@ -152,15 +161,66 @@ class FamilyComponent(Shown):
         """The structure of the mandatory graph of every mode."""
         return tuple(analyse(mode.mandatory) for mode in self.family.modes)
 
+    @cached_property
+    def special(self) -> tuple[str, ...]:
+        """The sharper behaviours that every signal shows, the sharpest last.
+
+        - Signed-average consensus: bipartite consensus where each edge of each mode is undirected, both directions one
+          parameter or known: ``g' X`` stays what it is.
+        - Consensus, and containment: all edges of all modes are positive.
+
+        References
+        ----------
+        Corollaries 1 to 5 of [Zhu]_; docs/theory/families.md.
+
+        Examples
+        --------
+        >>> decide(Family.from_intervals([("a", "b", 1, 2)], undirected=True))[0].special
+        ('signed-average consensus', 'consensus')
+        """
+        if self.behaviour not in CHAIN:
+            return ()
+        positive = bool((self.family.union[2] > 0).all())
+        if self.behaviour != BIPARTITE_CONSENSUS:
+            return (CONTAINMENT,) if positive else ()
+        pairs = zip(self.family.modes, self.structures, strict=True)
+        undirected = all(mode.tied or (mode.known.all() and s.undirected) for mode, s in pairs) and self.nodes.size > 1
+        special = [SIGNED_AVERAGE_CONSENSUS] if undirected else []
+        if positive:
+            special.append(CONSENSUS)
+        return tuple(special)
+
+    @property
+    def sharpest(self) -> str:
+        """The sharpest behaviour, or that none is decided.
+
+        Examples
+        --------
+        >>> decide([("a", "b", 1, 2)])[0].sharpest
+        'consensus'
+        """
+        return (self.behaviour or "not decided", *self.special)[-1]
+
+    @property
+    def camps(self) -> list[np.ndarray]:
+        """The camps that all edges of all modes keep, that of the first node first; one or two, or none."""
+        if self.gauge is None:
+            return []
+        return [side for sign in (1, -1) if (side := np.flatnonzero(self.gauge == sign)).size]
+
     def holds(self, behaviour: str) -> bool | None:
-        """Tell whether every signal shows ``behaviour``, one of those of :attr:`behaviour`; None if undecided.
+        """Tell whether every signal shows ``behaviour``, special cases included; None if undecided.
 
         Examples
         --------
         >>> pair = decide(Family.from_intervals([("a", "b", 0, 1), ("b", "a", 1, 2)]))[0]
-        >>> pair.behaviour, pair.holds("bipartite containment")
-        ('bipartite consensus', True)
+        >>> pair.behaviour, pair.holds("containment"), pair.holds("signed-average consensus")
+        ('bipartite consensus', True, False)
         """
+        if behaviour in GENERAL:
+            general = self.holds(GENERAL[behaviour])
+            special = behaviour in self.special or (behaviour == CONTAINMENT and CONSENSUS in self.special)
+            return special if general else general
         if self.behaviour is None and behaviour in CHAIN[1:]:
             return False if self.refutation(behaviour) else None
         chain = CHAIN[CHAIN.index(self.behaviour) :] if self.behaviour in CHAIN else (self.behaviour,)
@@ -169,12 +229,15 @@ class FamilyComponent(Shown):
     def refutation(self, behaviour: str) -> Counterexample | None:
         """Return what refutes ``behaviour`` for every signal; None if it holds, or is not decided.
 
+        None also where a special case alone does not hold.
+
         Examples
         --------
         >>> pair = Family.from_intervals([("a", "b", 0, 1), ("b", "a", 1, 2)])
         >>> decide(pair)[0].refutation("stability").kind
         'balanced closed set'
         """
+        behaviour = GENERAL.get(behaviour, behaviour)
         if self.behaviour is not None and self.holds(behaviour):
             return None
         if behaviour == STABILITY:

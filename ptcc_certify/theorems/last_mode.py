@@ -15,8 +15,7 @@ from ptcc_certify.graphs.structure import (
     STABILITY,
     find_camps,
 )
-from ptcc_certify.theorems.family_behaviour import CHAIN, FamilyComponent
-from ptcc_certify.theorems.family_special_cases import GENERAL
+from ptcc_certify.theorems.family_behaviour import CHAIN, GENERAL, FamilyComponent
 
 
 def last_mode_behaviours(component: FamilyComponent) -> tuple[str | None, ...]:

@@ -38,8 +38,8 @@ from ptcc_certify.report.page import report_html
 from ptcc_certify.report.report_file import write_report
 from ptcc_certify.report.screen import certificate_lines, check_summary, summary_lines
 from ptcc_certify.report.statement import report_latex
+from ptcc_certify.theorems.contractions import clock_for_all_edges
 from ptcc_certify.theorems.family_behaviour import decide
-from ptcc_certify.theorems.joint_windows import clock_for_all_edges
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
 IN_TIME, ON_CLOCK = DwellTime("0.2", clock="t"), DwellTime(3, clock="s")

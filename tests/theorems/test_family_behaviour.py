@@ -23,7 +23,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.theorems.agreeing_groups import FamilyGroups
-from ptcc_certify.theorems.explicit_family_rate import explicit_rate
+from ptcc_certify.theorems.contractions import explicit_rate
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, decide
 
 CHAIN = ("bipartite consensus", "interval bipartite consensus", "bipartite containment")

@@ -37,7 +37,7 @@ from ptcc_certify.graphs.structure import analyse, find_camps
 from ptcc_certify.lyapunov.common_forms import CommonForm, mean_constant, rounded_up
 from ptcc_certify.lyapunov.interval_rows import IntervalRows, Policy
 from ptcc_certify.lyapunov.quotient import Quotient
-from ptcc_certify.theorems.family_kernel import reached
+from ptcc_certify.theorems.kernel import reached
 from ptcc_certify.theorems.lemmas import solve_exact
 
 _ROUNDS = 60

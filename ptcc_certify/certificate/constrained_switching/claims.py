@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS
 from ptcc_certify.model.constrained_switching import ClockShares, JointWindows, SignalClass
-from ptcc_certify.theorems.explicit_family_rate import ExplicitRate
+from ptcc_certify.theorems.contractions import ExplicitRate
 
 if TYPE_CHECKING:  # classes of signals are told without the solvers
     from ptcc_certify.bounds.final_state.of_family import ValueEnds

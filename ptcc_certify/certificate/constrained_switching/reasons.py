@@ -8,8 +8,8 @@ from lmi.exact.decimal_rounding import down
 from ptcc_certify.certificate.constrained_switching.claims import ShareClaim
 from ptcc_certify.checker.constrained_switching import MANY_CLAIMS
 from ptcc_certify.model.constrained_switching import ClockShares, JointWindows
+from ptcc_certify.theorems.contractions import joint_behaviour
 from ptcc_certify.theorems.family_behaviour import DEPENDS
-from ptcc_certify.theorems.joint_windows import joint_behaviour
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.family_proof import FamilyProof

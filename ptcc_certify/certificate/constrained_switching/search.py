@@ -36,8 +36,8 @@ from ptcc_certify.lyapunov.mode_forms import ModeForms, search_mode_forms, searc
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.model import Protocol
 from ptcc_certify.model.constrained_switching import ClockShares, DwellTime, JointWindows, SignalClass
+from ptcc_certify.theorems.contractions import joint_behaviour, window_rate
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
-from ptcc_certify.theorems.joint_windows import joint_behaviour, window_rate
 from ptcc_certify.theorems.last_mode import last_mode_behaviours
 
 STEP = "restricted signals"

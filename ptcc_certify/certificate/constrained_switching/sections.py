@@ -42,8 +42,8 @@ from ptcc_certify.lyapunov.common_forms import CommonForm, prove_ends
 from ptcc_certify.lyapunov.mode_forms import ModeForms
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.model.constrained_switching import ClockShares, DwellTime, JointWindows, SignalClass
+from ptcc_certify.theorems.contractions import contraction
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
-from ptcc_certify.theorems.joint_windows import contraction
 from ptcc_certify.theorems.theorem import Obligation
 
 #: Bits of the middles and radii of final states, which are rounded outwards.

@@ -19,12 +19,7 @@ from ptcc_certify.graphs.io.files import lines_of
 from ptcc_certify.graphs.io.problems import Problem, Problems, one_message
 from ptcc_certify.graphs.io.raw_edges import DECIMALS, HEADER_MEND, Beside, Draft, Numbers, Rows, Signs
 from ptcc_certify.graphs.io.signs import WEIGHT, plain, sign_of_word
-from ptcc_certify.graphs.io.table_columns import (
-    Columns,
-    asks_of_corner,
-    columns_of,
-    names_edges,
-)
+from ptcc_certify.graphs.io.table_columns import Columns, asks_of_corner, columns_of, names_edges
 from ptcc_certify.graphs.io.text_matrices import bracketed_matrix, is_entry, table_as_matrix
 from ptcc_certify.graphs.labels import first_five, ordered_labels
 from ptcc_certify.graphs.rationals import parse_exact, shorten

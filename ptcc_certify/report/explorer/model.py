@@ -34,8 +34,7 @@ from ptcc_certify.model.reaching_time import certified_reaching_times
 from ptcc_certify.model.refusals import refuse_before_the_graph
 from ptcc_certify.report.explorer.facts import UNCHECKED, of_controls, rows_of
 from ptcc_certify.report.explorer.panels import PANELS, draw_panels, message_figure, panel_svg, png, shown_in
-from ptcc_certify.report.explorer.question import Question
-from ptcc_certify.report.explorer.reproduction import command_of, python_of
+from ptcc_certify.report.explorer.question import Question, command_of, python_of
 from ptcc_certify.report.explorer.settings import GIVEN, Settings, refuse_unknown
 from ptcc_certify.simulation.run import simulate
 

@@ -17,20 +17,11 @@ from ptcc_certify.graphs.structure import BIPARTITE_CONTAINMENT, STABILITY, Stru
 from ptcc_certify.report.facts.agents import claimed_of
 from ptcc_certify.report.facts.constrained_switching import RESTS, of_mode
 from ptcc_certify.report.facts.input import without
-from ptcc_certify.report.facts.interval_words import interval_text
-from ptcc_certify.report.text_layout import (
-    TEXT,
-    agent_text,
-    columns,
-    printable,
-    shorten_list,
-    wrap_text,
-)
+from ptcc_certify.report.text_layout import TEXT, agent_text, columns, interval_text, printable, shorten_list, wrap_text
 from ptcc_certify.theorems.agreeing_groups import AgreeingGroup, FamilyGroups
 from ptcc_certify.theorems.claims import Claim
 from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
 from ptcc_certify.theorems.family_behaviour import CHAIN, DEPENDS, FamilyComponent, decide
-from ptcc_certify.theorems.family_special_cases import camps, special_behaviours
 
 if TYPE_CHECKING:
     from ptcc_certify.bounds.final_state.attracting_box import AttractingBox
@@ -127,17 +118,6 @@ def _claim_text(claim: Claim, when: str) -> str:
 # ---------------------------------------------------------------------- families
 
 
-def sharpest(component: FamilyComponent) -> str:
-    """Name the sharpest behaviour of a component.
-
-    Examples
-    --------
-    >>> sharpest(ptcc.decide([("a", "b", 1, 2)])[0])
-    'consensus'
-    """
-    return (str(component.behaviour or "not decided"), *special_behaviours(component))[-1]
-
-
 def family_claims(
     components: Sequence[FamilyComponent], when: str = "", certificate: Certificate | None = None
 ) -> Facts:
@@ -149,12 +129,12 @@ def family_claims(
     order = sorted(range(len(components)), key=lambda k: -components[k].nodes.size)
     if len(components) == 1:
         text, longer = _behaviour_texts(components[0], when, also)
-        yield Fact(head="claim", value=sharpest(components[0]), note=longer[0], brief=(longer[1], text))
+        yield Fact(head="claim", value=components[0].sharpest, note=longer[0], brief=(longer[1], text))
     else:
         for k in order[:_COMPONENTS]:
             text, (_, camps_named) = _behaviour_texts(components[k], when, also)
             text = camps_named if columns(camps_named) <= TEXT else text
-            yield _component_fact(components[k].family.labels, sharpest(components[k]), text)
+            yield _component_fact(components[k].family.labels, components[k].sharpest, text)
         if len(components) > _COMPONENTS:
             yield Fact(head="claim", note=f"... {len(components):,} components in all")
     depending = [k for k in order if components[k].behaviour == DEPENDS]
@@ -175,8 +155,8 @@ def _behaviour_texts(component: FamilyComponent, when: str, also: str) -> tuple[
     whatever = WHATEVER[component.signal]
     if len(component.family.modes) == 1:
         whatever = whatever.replace("mode and ", "")
-    text = f"{sharpest(component)}{when} {whatever}{also}"
-    sides = camps(component)
+    text = f"{component.sharpest}{when} {whatever}{also}"
+    sides = component.camps
     if component.behaviour == STABILITY or len(sides) < 2:
         return text, (text, text)
     named = [
@@ -195,7 +175,7 @@ def _depends_facts(component: FamilyComponent, direct: bool, detail: bool) -> Fa
         texts["alone"] = "; ".join(alone)
     elif component.signal == "any":
         (constant, *_) = decide(family, "constant")
-        behaviour = "it depends on the weights" if constant.behaviour == DEPENDS else sharpest(constant)
+        behaviour = "it depends on the weights" if constant.behaviour == DEPENDS else constant.sharpest
         texts["constant"] = f"where weights never change: {behaviour}"
     if component.signal == "any":
         texts["groups"] = groups_text(component, direct)
@@ -214,11 +194,11 @@ def _alone(mode: Mode, direct: bool) -> str:
         return RESTS if direct else f"every agent {DRIVEN}"
     components = decide(Family((mode,)))
     if len(components) == 1:
-        return sharpest(components[0])
+        return components[0].sharpest
     parts, behaviours = f"{len(components):,} separate parts", {part.behaviour for part in components}
     if behaviours <= {*CHAIN}:
         return f"{of_mode(BIPARTITE_CONTAINMENT, mode)}, in {parts}"
-    return f"{parts}, each by itself: {', '.join(dict.fromkeys(map(sharpest, components)))}"
+    return f"{parts}, each by itself: {', '.join(dict.fromkeys(part.sharpest for part in components))}"
 
 
 def groups_text(component: FamilyComponent, direct: bool = True) -> str:

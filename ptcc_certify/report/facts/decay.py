@@ -19,14 +19,14 @@ from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
 from ptcc_certify.report.facts.constrained_switching import TINY, TOO_SMALL, every_text
 from ptcc_certify.report.facts.input import limits_text, said_without
-from ptcc_certify.report.facts.reported_times import SHORT, told_instants
 from ptcc_certify.report.text_layout import shorten_list
+from ptcc_certify.theorems.contractions import explicit_rate
 from ptcc_certify.theorems.counterexample_text import mode_name
-from ptcc_certify.theorems.explicit_family_rate import explicit_rate
 
 if TYPE_CHECKING:
     from ptcc_certify.bounds.input.effort import Limited
     from ptcc_certify.certificate.certificate import Certificate
+    from ptcc_certify.model.base import Protocol
 
 #: What proves an upper bound on the rate, in words.
 BOUND_KINDS = {
@@ -34,6 +34,27 @@ BOUND_KINDS = {
     "mixture": "a mixture of graphs of the family, between which a signal switches fast",
     "word": "a periodic signal",
 }
+
+
+#: 1 - t/T and its name, where screen, page and statement tell what is left; the last are told of one graph alone.
+_INSTANTS = ((0.5, "0.5 T"), (0.1, "0.9 T"), (0.01, "0.99 T"), (1e-6, "T(1-1e-6)"), (1e-9, "T(1-1e-9)"))
+#: Which of them the short screen tells.
+SHORT = 2
+
+
+def told_instants(protocol: Protocol, direct: bool) -> list[tuple[float, str]]:
+    """Return ``1 - t/T`` and its name: with a reaching phase (not ``direct``) counted from ``T_r`` on.
+
+    Examples
+    --------
+    >>> p = SlidingModeProtocol(T_r=1, T_s=3, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+    >>> told_instants(p, True)[0], told_instants(p, False)[0]
+    ((0.5, '0.5 T'), (0.375, 'T_r + 0.5 T_s'))
+    """
+    if direct:
+        return list(_INSTANTS)
+    share = float(protocol.span / protocol.T)
+    return [(left * share, f"T_r + {name.replace('T', 'T_s')}") for left, name in _INSTANTS]
 
 
 # ---------------------------------------------------------------------- one graph

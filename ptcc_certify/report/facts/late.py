@@ -128,8 +128,7 @@ def _tracking(late: LateBounds, leaders: MovingLeaders, at: Fraction | None) -> 
         text = f"bounded up to T; |u_k| <= {up(largest, 4) if largest else 0}{whole}"
         yield Fact(head="input", value=largest, side="up", note=text)
     else:
-        moving = "while leaders move" if leaders.speed else "under disturbances"
-        note = (f"not proved bounded {moving}; ", Change("rho2", late.bounding_rho2), " bounds it")
+        note = (f"not proved bounded {leaders.while_told}; ", Change("rho2", late.bounding_rho2), " bounds it")
         yield Fact(head="input", standing="unproved", note=note, loud=True)
     if late.largest and (by_agent := _residual_text(late)):
         yield Fact(head="left", note=f"at T by agent: {by_agent}", detail=True)

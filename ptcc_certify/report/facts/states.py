@@ -13,10 +13,11 @@ from ptcc_certify.certificate.fact import Fact, Facts
 from ptcc_certify.errors import labelled
 from ptcc_certify.report.facts.claim import assumptions, range_text, told_ranges
 from ptcc_certify.report.facts.constrained_switching import agreement_text, every_text, rests
-from ptcc_certify.report.facts.interval_words import interval_text, intervals_text
 from ptcc_certify.report.text_layout import (
     TEXT,
     columns,
+    interval_text,
+    intervals_text,
     printable,
     short_number,
     shorten_list,

@@ -10,7 +10,7 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.report.plots.lines_of_agents import CAMP_STYLES, camp_groups
+from ptcc_certify.report.plots.camp_lines import CAMP_STYLES, camp_groups
 from ptcc_certify.report.plots.style import EDGE_STYLES, finished
 
 #: Cells of the picture in each direction, and depths of their colours.

@@ -11,8 +11,15 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.model import NominalProtocol, Protocol
+from ptcc_certify.report.plots.camp_lines import (
+    CAMP_STYLES,
+    NAME_SIZE,
+    NAMED_AGENTS,
+    camp_groups,
+    camp_lines,
+    name_agents,
+)
 from ptcc_certify.report.plots.graph import plot_graph
-from ptcc_certify.report.plots.lines_of_agents import CAMP_STYLES, NAME_SIZE, NAMED_AGENTS, camp_groups, name_agents
 from ptcc_certify.report.plots.style import axes_of, finished, styled, time_label
 from ptcc_certify.report.text_layout import printable, shorten_text
 from ptcc_certify.simulation.run import simulate
@@ -28,7 +35,7 @@ from ptcc_certify.theorems.family_behaviour import (
     Counterexample,
     FamilyComponent,
 )
-from ptcc_certify.theorems.family_kernel import Kernel
+from ptcc_certify.theorems.kernel import Kernel
 
 #: Where the second of two leader groups begins, the first at 1.
 _SECOND = 0.5
@@ -90,11 +97,8 @@ def plot_counterexample(
     ax, groups = axes_of(ax), camp_groups(subject.structures[why.mode])
     moved = np.ptp(run.states, axis=1)
     agents = sorted(np.argsort(-moved, kind="stable")[:NAMED_AGENTS].tolist())
-    seen = set()
-    for k in agents:
-        colour, line = CAMP_STYLES[groups[k]]
-        ax.plot(run.t, run.states[k], color=colour, linestyle=line, label=None if groups[k] in seen else groups[k])
-        seen.add(groups[k])
+    for k, style in camp_lines(groups, agents):
+        ax.plot(run.t, run.states[k], **style)
     ax.axvline(T, color="black", linewidth=0.8, linestyle=":", label="deadline $T$")
     low, high = float(run.states.min()), float(run.states.max())
     room = (high - low) or 1.0
@@ -104,8 +108,8 @@ def plot_counterexample(
             ax.axvline(share * T, color="black", linewidth=0.8)
         end = rows[place + 1][0] if place + 1 < len(rows) else 1.0
         name = shorten_text(printable(mode_name(subject.family, mode)), 18)
-        style: dict[str, Any] = {"ha": "center", "va": "top", "fontsize": NAME_SIZE, "parse_math": False}
-        ax.text((share + end) / 2 * T, high + 0.2 * room, _member_text(subject, why, place, name), **style)
+        drawn: dict[str, Any] = {"ha": "center", "va": "top", "fontsize": NAME_SIZE, "parse_math": False}
+        ax.text((share + end) / 2 * T, high + 0.2 * room, _member_text(subject, why, place, name), **drawn)
     name_agents(ax, run, run.states, {k: CAMP_STYLES[groups[k]][0] for k in agents}, until=float(run.t[-1]))
     return finished(ax, time_label("time $t$", time_unit), "state $x_k$")
 

@@ -17,9 +17,9 @@ from ptcc_certify.graphs.io.conversion import as_family, is_family
 from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.report.plots.adjacency import draw_adjacency
+from ptcc_certify.report.plots.camp_lines import CAMP_STYLES, camp_groups, family_camps, family_groups
 from ptcc_certify.report.plots.graph_labels import INSIDE, boxes_along, draw_labels, draw_sizes
 from ptcc_certify.report.plots.graph_layout import FREE_NODES, Arrow, places_and_bends, triangles_of
-from ptcc_certify.report.plots.lines_of_agents import CAMP_STYLES, camp_groups, family_camps, family_groups
 from ptcc_certify.report.plots.style import EDGE_STYLES, SINGLE_COLUMN, axes_of, finished, styled
 from ptcc_certify.report.plots.subject import is_of_family, structure_of
 from ptcc_certify.report.text_layout import columns, printable, shorten_text

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from ptcc_certify.report.plots.camp_lines import HALO, NAME_SIZE, text_width
 from ptcc_certify.report.plots.graph_layout import Arrow, arc
-from ptcc_certify.report.plots.lines_of_agents import HALO, NAME_SIZE, text_width
 from ptcc_certify.report.plots.style import EDGE_STYLES
 from ptcc_certify.report.text_layout import printable, shorten_text
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,9 +16,8 @@ from ptcc_certify.certificate.judgements import largest_late_input
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.report.facts.input import initial_states_text
-from ptcc_certify.report.plots.agents_motion import agents_run
-from ptcc_certify.report.plots.lines_of_agents import draw_agents, draw_deadlines, name_agents
-from ptcc_certify.report.plots.peaks import Peak, draw_peaks
+from ptcc_certify.report.plots.camp_lines import NAME_SIZE, draw_agents, draw_deadlines, name_agents
+from ptcc_certify.report.plots.motion import agents_run
 from ptcc_certify.report.plots.runs import bound_label, count_of_signals, is_worst, line_of, runs_of
 from ptcc_certify.report.plots.style import BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.report.plots.subject import certifies_family, limits_text, require_same, structure_of, trajectory_of
@@ -28,6 +27,24 @@ from ptcc_certify.simulation.trajectory import Trajectory
 
 #: An error ``|e_k|`` below so many tolerances of the integrator, in units of what it is made of, is not resolved.
 RESOLVED_ERROR = 10
+
+
+#: An input that grows to so many times its initial size, or is above such a share of its largest for less than such a
+#: share of the time, is drawn on a logarithmic axis,
+LARGE_GROWTH, LARGE, BRIEF = 3, 1 / 5, 1 / 8
+#: from so many decades below its initial size on; changes of sign go further down.
+INPUT_DECADES = 3
+#: A bound is drawn as a line up to so many times the largest input of the run, else named at the top; on a linear axis,
+#: and on a logarithmic one.
+HIGH_PEAK, HIGH_PEAK_OF_LOGARITHM = 1.6, 30
+
+
+class Peak(NamedTuple):
+    """A proved bound of inputs, and its name."""
+
+    value: float
+    name: str
+    color: str = "black"
 
 
 @styled
@@ -107,7 +124,7 @@ def plot_input(
         title = limits_text(run, certificate)
     structure = analyse(run.graph) if isinstance(run, AgentsTrajectory) else structure_of(subject)
     named = draw_agents(ax, run, size, structure, size=True, drawstyle=steps)
-    draw_peaks(ax, run.t, size, peaks)
+    _draw_peaks(ax, run.t, size, peaks)
     draw_deadlines(ax, run)
     name_agents(ax, run, size, named)
     return finished(ax, x, name, title)
@@ -134,8 +151,43 @@ def _draw_signals(ax: Axes, certificate: Certificate, runs: Sequence[Trajectory]
         ax.plot(t, bound, color=BOUND, linewidth=1.8, label=bound_label(certificate))
         sizes.append(np.interp(first.t, t, bound, right=0.0))
     peaks = [Peak(float(peak), f"certified peak {up(peak, 4)}") for peak in sorted(proof.input_peaks or ())[-1:]]
-    draw_peaks(ax, first.t, np.array(sizes), peaks)
+    _draw_peaks(ax, first.t, np.array(sizes), peaks)
     ax.set_xlim(0, float(first.t[-1]))
+
+
+def _draw_peaks(ax: Axes, t: np.ndarray, size: np.ndarray, peaks: Sequence[Peak]) -> None:
+    """Set the axis of inputs of these sizes, (N, M), and draw what bounds them, with names; those far above at the top.
+
+    The axis is logarithmic where a linear one would leave most of the time, ``t`` (M,), flat. Of two lines the higher
+    one has its name above it, the lower one below.
+    """
+    largest = np.nan_to_num(size)
+    first, top = float(largest[:, :1].max(initial=0)), float(largest.max(initial=0))
+    even = np.interp(np.linspace(t[0], t[-1], 401), t, largest.max(axis=0))
+    brief = (even > LARGE * top).mean() < BRIEF
+    logarithmic = bool(first and (brief or top > LARGE_GROWTH * first))
+    most = HIGH_PEAK_OF_LOGARITHM if logarithmic else HIGH_PEAK
+    shown = [peak for peak in peaks if peak.value <= most * top or top == 0]
+    height = max([top, *(peak.value for peak in shown)])
+    if logarithmic:
+        ax.set_yscale("log", nonpositive="clip")
+        ax.set_ylim(first * 10.0**-INPUT_DECADES, height * 2)
+    else:
+        ax.set_ylim(0, 1.12 * height or 1)
+    ground = {"boxstyle": "square,pad=0.05", "facecolor": "white", "edgecolor": "none"}
+    style: dict[str, Any] = {"ha": "right", "fontsize": NAME_SIZE, "textcoords": "offset points", "bbox": ground}
+    above = 0
+    for peak in peaks:
+        if peak not in shown:
+            place, at = (0, -2 - 1.5 * NAME_SIZE * above), "axes fraction"
+            ax.annotate(f"{peak.name}, above", (1, 1), place, xycoords=at, va="top", color=peak.color, **style)
+            above += 1
+            continue
+        ax.plot(t[[0, -1]], [peak.value] * 2, color=peak.color, linewidth=0.9, linestyle="--")  # not over names
+        low = any(other.value > peak.value for other in shown)
+        ends: dict[str, Any] = {"va": "top" if low else "bottom", "color": peak.color}
+        sides = ("axes fraction", "data")
+        ax.annotate(peak.name, (1, peak.value), (0, -3 if low else 2), xycoords=sides, **ends, **style)
 
 
 def _agents_peaks(certificate: Certificate, sliding: bool) -> list[Peak]:

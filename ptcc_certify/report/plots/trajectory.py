@@ -13,9 +13,10 @@ from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS
 from ptcc_certify.model.reaching_time import ReachingTime
-from ptcc_certify.report.plots.lines_of_agents import (
+from ptcc_certify.report.plots.camp_lines import (
     CAMP_STYLES,
     NAMED_AGENTS,
+    camp_lines,
     draw_agents,
     draw_deadlines,
     family_camps,
@@ -108,14 +109,12 @@ def _draw_signals(
     groups = family_camps(proof.family)
     if groups is None or not all(part.component.behaviour == BIPARTITE_CONSENSUS for part in proof.parts):
         groups = family_groups(proof.family)
-    agents, labels = _extreme_agents(runs[0].states[:, 0]), set()
-    for k in agents:
+    agents = _extreme_agents(runs[0].states[:, 0])
+    for k, style in camp_lines(groups, agents):
         for run in runs:
-            worst, (color, line) = is_worst(run), CAMP_STYLES[groups[k]]
-            style: dict[str, Any] = {"linewidth": 1.1 if worst else 0.5, "alpha": 1.0 if worst else 0.7}
-            style |= {"color": color, "linestyle": line, "label": None if groups[k] in labels else groups[k]}
-            ax.plot(run.t, run.states[k], **style)
-            labels.add(groups[k])
+            worst = is_worst(run)
+            ax.plot(run.t, run.states[k], linewidth=1.1 if worst else 0.5, alpha=1.0 if worst else 0.7, **style)
+            style["label"] = None
     bars = _draw_tubes(ax, certificate, runs[0], agents, groups)
     values = np.concatenate([bars, *(run.states[agents].ravel() for run in runs)])
     low, high = float(values.min()), float(values.max())

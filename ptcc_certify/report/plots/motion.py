@@ -14,12 +14,12 @@ from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.report.plots.lines_of_agents import (
-    CAMP_STYLES,
+from ptcc_certify.report.plots.camp_lines import (
     HALO,
     NAME_SIZE,
     NAMED_AGENTS,
     camp_groups,
+    camp_lines,
     draw_agents,
     draw_deadlines,
     name_agents,
@@ -173,10 +173,9 @@ def plot_formation(subject: Any, *, ax: Axes | None = None) -> Axes:
     ax = axes_of(ax, (SINGLE_COLUMN[0], SINGLE_COLUMN[0]))
     groups = camp_groups(analyse(run.graph))
     width = 1.0
-    for k, (x, y) in enumerate(run.positions):
-        color, line = CAMP_STYLES[groups[k]]
-        first = k == int(np.flatnonzero(groups == groups[k])[0])
-        ax.plot(x, y, color=color, linestyle=line, linewidth=width, label=groups[k] if first else None)
+    for k, style in camp_lines(groups, range(len(groups))):
+        (x, y), color = run.positions[k], style["color"]
+        ax.plot(x, y, linewidth=width, **style)
         ax.plot(x[0], y[0], "o", markersize=3.5, markerfacecolor="white", markeredgecolor=color, zorder=4)
         ax.plot(x[-1], y[-1], "o", markersize=4.5, color=color, zorder=5)
     ax.set_aspect("equal", adjustable="datalim")

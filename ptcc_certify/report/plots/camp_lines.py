@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -51,7 +51,7 @@ def family_camps(family: Family) -> np.ndarray | None:
 
     Examples
     --------
-    >>> from ptcc_certify.report.plots.lines_of_agents import family_camps
+    >>> from ptcc_certify.report.plots.camp_lines import family_camps
     >>> family_camps(ptcc.as_family([("a", "b", -2, -1)])).tolist()
     ['first camp', 'second camp']
     """
@@ -64,7 +64,7 @@ def family_groups(family: Family) -> np.ndarray:
 
     Examples
     --------
-    >>> from ptcc_certify.report.plots.lines_of_agents import family_groups
+    >>> from ptcc_certify.report.plots.camp_lines import family_groups
     >>> day, night = SignedDigraph.from_edges([("a", "b", 1)]), SignedDigraph.from_edges([("b", "a", 1)], nodes="ab")
     >>> family_groups(Family.switching([day, night])).tolist()
     ['first camp', 'first camp']
@@ -74,6 +74,23 @@ def family_groups(family: Family) -> np.ndarray:
         return own[0]
     camps = family_camps(family)
     return np.full(family.n_nodes, "agents", dtype=object) if camps is None else camps
+
+
+def camp_lines(groups: np.ndarray, agents: Iterable[int]) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Yield agents, each with how its line is drawn; the first of a part of the graph has its name for the legend.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.camp_lines import camp_lines
+    >>> [(k, style["label"]) for k, style in camp_lines(np.array(["followers", "agents", "followers"]), [0, 1, 2])]
+    [(0, 'followers'), (1, 'agents'), (2, None)]
+    """
+    seen = set[str]()
+    for k in agents:
+        name = str(groups[k])
+        colour, line = CAMP_STYLES[name]
+        yield k, {"color": colour, "linestyle": line, "label": None if name in seen else name}
+        seen.add(name)
 
 
 def text_width(text: str) -> float:
