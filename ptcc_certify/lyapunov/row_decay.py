@@ -198,7 +198,7 @@ def _extended(rows: IntervalRows, d: np.ndarray) -> np.ndarray:
 def _vector(rows: IntervalRows, t: float, policy: Policy) -> tuple[np.ndarray | None, Policy]:
     """Return ``d`` that proves a rate above ``t``, or None, and the last policy: refused, its member is slower."""
     for _ in range(_ROUNDS):
-        d = positive_vector(rows.system(policy)[0], t)
+        d = positive_vector(rows.system(policy), t)
         if not (np.isfinite(d).all() and (d > 0).all() and d.max() < 1e250 * d.min()):
             return None, policy
         if (rows.pull(_extended(rows, d)) >= t * d).all():
@@ -215,7 +215,7 @@ def _largest_rate(rows: IntervalRows) -> tuple[float, list[Policy]] | None:
     policy = rows.worst(_extended(rows, np.ones(rows.n)))
     low, refused = 0.0, policy
     for _ in range(_ROUNDS):
-        found = smallest_eigenvalue(rows.system(policy)[0], shifted=True)
+        found = smallest_eigenvalue(rows.system(policy), shifted=True)
         if found is None:
             return None
         high = found[0] * (1 - _NEAR)
@@ -230,7 +230,7 @@ def _largest_rate(rows: IntervalRows) -> tuple[float, list[Policy]] | None:
     if low:
         d, refused = _vector(rows, high, policy)
         if d is not None:
-            low, high = high, float(rows.system(policy)[0].diagonal().min())
+            low, high = high, float(rows.system(policy).diagonal().min())
     for _ in range(_TRIALS):
         if high <= low * (1 + _TOLERANCE):
             break
@@ -261,7 +261,7 @@ def _rate_of_member(rows: IntervalRows, policy: Policy) -> Fraction | None:
     """
     from scipy.sparse.csgraph import connected_components
 
-    M, _ = rows.system(policy)
+    M = rows.system(policy)
     _, strong = connected_components(M, directed=True, connection="strong")
     size = np.bincount(strong)
     diagonal = M.diagonal()
