@@ -19,7 +19,7 @@ docs/theory/families.md, "Rows". Howard, Dynamic Programming and Markov Processe
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
@@ -175,8 +175,13 @@ def prove_follower_decay(rows: IntervalRows, nodes: np.ndarray, d: np.ndarray) -
     return FollowerDecay(nodes, whole, rounded(rate, 53)) if rate > 0 else None
 
 
-def least_rate(rows: IntervalRows, d: np.ndarray) -> Fraction:
+def least_rate(
+    rows: IntervalRows, d: np.ndarray, outside: np.ndarray | None = None, drifts: Sequence[Fraction] = ()
+) -> Fraction:
     """Return the largest ``alpha`` that positive integers ``d`` prove; exact.
+
+    ``sum_l |w_kl| (d_k - d_l) - drift_k >= alpha d_k``, with ``d_l`` of nodes outside as given, 0 by default. Drifts
+    are rounded up to multiples of the unit.
 
     Examples
     --------
@@ -184,7 +189,10 @@ def least_rate(rows: IntervalRows, d: np.ndarray) -> Fraction:
     >>> least_rate(rows, np.array([1, 2])), least_rate(rows, np.array([2, 1]))
     (Fraction(1, 2), Fraction(-3, 1))
     """
-    pull = rows.pull(np.concatenate([d, np.zeros(rows.outside, dtype=np.int64).astype(d.dtype)]))
+    outside = np.zeros(rows.outside, dtype=np.int64).astype(d.dtype) if outside is None else outside
+    pull = rows.pull(np.concatenate([d, outside]))
+    if any(drifts):
+        pull = pull - np.array([-(-q // rows.unit) for q in drifts], dtype=object)
     return least_quotient(pull.ravel(), np.tile(d, rows.modes)) * rows.unit
 
 
