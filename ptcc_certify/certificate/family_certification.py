@@ -35,7 +35,7 @@ from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
 from ptcc_certify.lyapunov.aimed_forms import Aim, aimed_functions
-from ptcc_certify.lyapunov.common_form_search import CLOSED_ROWS, FULL_ROWS, FamilySearch, search_common_forms
+from ptcc_certify.lyapunov.common_form_search import CLOSED_ROWS, FULL_ROWS, CommonFormSearch, search_common_forms
 from ptcc_certify.lyapunov.common_forms import CommonForm
 from ptcc_certify.lyapunov.follower_function import follower_functions
 from ptcc_certify.lyapunov.quotient import Quotient
@@ -128,7 +128,7 @@ def _fewer_functions(certificate: Certificate) -> Certificate:
     """
     proof = certificate.family_proof
     parts = proof.parts
-    functions = [(part, V) for part in parts for V in part.functions if isinstance(V, CommonForm)]
+    functions = [(part, V) for part in parts for V in part.forms]
     work = sum((len(V.nodes) + len(tau)) ** 3 for _, V in functions for tau in V.multipliers)
     few = sum(len(part.functions) for part in parts) <= MANY_FUNCTIONS
     if (few and work <= LARGEST_ROWS**3) or not proof.checkable:
@@ -230,7 +230,7 @@ def _prove(
             functions += _dense(component, notes) if not functions else []
         return ComponentProof(component, tuple(functions))
     quotient = Quotient.of(component)
-    bound, search = None, FamilySearch()
+    bound, search = None, CommonFormSearch()
     progress(STEPS[1])
     with share_of_time(_BOUND_SHARE, STEPS[1], notes):
         bound = prove_signal_rate_bound(quotient)

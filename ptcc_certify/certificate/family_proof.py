@@ -44,6 +44,7 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.structure import STABILITY
+from ptcc_certify.lyapunov.common_forms import CommonForm
 from ptcc_certify.lyapunov.follower_function import FollowerFunction
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.slow_signals import SignalRateBound
@@ -73,6 +74,11 @@ class ComponentProof:
     def rate(self) -> Fraction | None:
         """The largest proved rate for every signal; None if there is none."""
         return max((V.rate for V in self.functions if V.rate > 0), default=None)
+
+    @property
+    def forms(self) -> tuple[CommonForm, ...]:
+        """The quadratic ones of the functions."""
+        return tuple(V for V in self.functions if isinstance(V, CommonForm))
 
     @property
     def certifiable(self) -> bool:

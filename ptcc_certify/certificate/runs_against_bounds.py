@@ -147,9 +147,8 @@ def worst_case_signals(certificate: Certificate, step: float | None = None) -> l
 def functions_of(certificate: Certificate) -> Iterator[tuple[np.ndarray, CommonForm]]:
     """Yield every quadratic Lyapunov function with the nodes of its component."""
     for part in certificate.family_proof.parts:
-        for V in part.functions:
-            if isinstance(V, CommonForm):
-                yield part.component.nodes, V
+        for V in part.forms:
+            yield part.component.nodes, V
 
 
 def _require_same(certificate: Certificate, run: Trajectory) -> None:
@@ -235,8 +234,8 @@ def _driven_ratios(certificate: Certificate, run: Trajectory, floor: float) -> I
     before = np.isfinite(run.clock)
     y = (run.states - run.sliding.sigma)[:, before]
     for number, part in enumerate(proof.parts):
-        for V in part.functions:
-            if isinstance(V, CommonForm) and V.rate > 0:
+        for V in part.forms:
+            if V.rate > 0:
                 root, size = _roots(part.component.nodes, V, y, floor)
                 bound = proof.norm_bound(V, number, run.remaining[before])
                 yield _worst(root - size, bound) or 0.0

@@ -19,10 +19,10 @@ from itertools import product
 import numpy as np
 
 from lmi.common_lyapunov import least_value
-from lmi.errors import LMIError, OutOfTime
 from ptcc_certify.lyapunov.common_form_search import prove_certificate
 from ptcc_certify.lyapunov.common_forms import CommonForm
 from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.search_failures import failures_told
 
 #: Losses of the rate, for late instants and earlier ones.
 _LOSSES = (1e-3, 0.03, 0.2)
@@ -87,12 +87,10 @@ def aimed_functions(
     floors = (units, squares + _REST * np.trace(squares) * units)
     arrays = [mode.array for mode in modes]
     for rate, floor in product((top * (1 - loss) for loss in _LOSSES), floors):
-        try:
+        form = None
+        with failures_told(notes, "full"):  # a smaller rate is easier
             form = least_value(arrays, [rate] * len(arrays), aim.begin, floor)
-        except OutOfTime:
-            raise
-        except (LMIError, np.linalg.LinAlgError) as error:  # a smaller rate is easier
-            notes.append(f"class full: {error}")
+        if form is None:
             continue
         bounds = _log_bounds(form.matrix, form.rate, aim, rows)
         if (bounds < best - math.log(_WORTH)).any():

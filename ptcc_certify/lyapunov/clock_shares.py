@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from lmi.errors import LMIError, OutOfTime
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
@@ -19,6 +18,7 @@ from ptcc_certify.lyapunov.common_form_search import search_common_forms
 from ptcc_certify.lyapunov.common_forms import CommonForm
 from ptcc_certify.lyapunov.mode_forms import within_reach
 from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.search_failures import failures_told
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
 
 
@@ -77,11 +77,10 @@ def search_share_form(
     camps = len(quotient.pivots) == 1 and component.gauge is not None
     if not (camps or not quotient.pivots) or not within_reach(quotient):
         return None
-    try:
+    search = None
+    with failures_told([], "full"):
         search = search_common_forms(quotient, ("diagonal", "full"), shares=[float(s) for s in shares])
-    except OutOfTime:
-        raise
-    except LMIError:
+    if search is None:
         return None
     at_rest = tuple(mode.at_rest for mode in quotient.modes)
     functions = (*search.functions, *known)

@@ -22,7 +22,7 @@ import numpy as np
 from lmi.common_closed_form import closed_form_lyapunov
 from lmi.common_lyapunov import CommonCertificate, best_multipliers, common_lyapunov, least_condition
 from lmi.dyadic import round_to_bits
-from lmi.errors import LMIError, NoCertificate, OutOfTime
+from lmi.errors import NoCertificate
 from lmi.search_time import checkpoint, part_of_time, share_of_time
 from ptcc_certify.checker.matrix_products import LARGEST_ROWS, WITH_MULTIPLIERS
 from ptcc_certify.graphs.size_limits import EXACT_NODES
@@ -30,6 +30,7 @@ from ptcc_certify.lyapunov.common_forms import CommonForm, prove_ends, prove_mod
 from ptcc_certify.lyapunov.common_left_vector import undirected_function
 from ptcc_certify.lyapunov.error_system import rounded_matrix
 from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.search_failures import failures_told
 
 #: Classes of functions.
 KINDS = ("undirected", "diagonal", "full")
@@ -48,7 +49,7 @@ _MATRIX_BITS, _MULTIPLIER_BITS = 60, 40
 
 
 @dataclass(frozen=True)
-class FamilySearch:
+class CommonFormSearch:
     """What the searches gave.
 
     Attributes
@@ -72,7 +73,7 @@ def search_common_forms(
     enough: Fraction | None = None,
     shares: Sequence[float] | None = None,
     slower: bool = True,
-) -> FamilySearch:
+) -> CommonFormSearch:
     """Search and prove Lyapunov functions of a family for every signal.
 
     Parameters
@@ -92,7 +93,7 @@ def search_common_forms(
 
     Returns
     -------
-    FamilySearch
+    CommonFormSearch
         Without functions if everything is at rest in every member.
 
     References
@@ -111,9 +112,9 @@ def search_common_forms(
     """
     n = len(quotient.nodes)
     if n > CLOSED_ROWS:
-        return FamilySearch(notes=(f"{n} agents are above the {CLOSED_ROWS} of the searches",))
+        return CommonFormSearch(notes=(f"{n} agents are above the {CLOSED_ROWS} of the searches",))
     if not n or all(mode.at_rest for mode in quotient.modes):
-        return FamilySearch()
+        return CommonFormSearch()
     functions: list[CommonForm] = []
     notes: list[str] = []
     cut_off: list[str] = []
@@ -121,10 +122,10 @@ def search_common_forms(
         with share_of_time(1.0, "undirected", cut_off):
             functions += filter(None, [undirected_function(quotient)])
     if shares is None and any(V.optimal for V in functions):
-        return FamilySearch(tuple(functions), tuple(notes), tuple(cut_off))
+        return CommonFormSearch(tuple(functions), tuple(notes), tuple(cut_off))
     most = max(mode.proof_rows for mode in quotient.modes)
     if most > WITH_MULTIPLIERS:
-        return FamilySearch(
+        return CommonFormSearch(
             tuple(functions), (f"{most:,} {TOO_MANY_ROWS}, {WITH_MULTIPLIERS} at most",), tuple(cut_off)
         )
     closed = _closed_function(quotient, cut_off) if "full" in kinds and shares is None else None
@@ -138,19 +139,14 @@ def search_common_forms(
             if closed is None:
                 notes.append(f"class {kind} is searched up to {rows} rows; these are {n}")
             continue
-        with share_of_time(own, f"class {kind}", cut_off):
-            try:
-                losses = _LOSSES if slower else ()
-                for function in _common_functions(quotient, kind, notes, shares, losses):  # kept, whatever comes after
-                    functions.append(function)
-            except OutOfTime:
-                raise
-            except (LMIError, np.linalg.LinAlgError) as error:
-                notes.append(f"class {kind}: {error}")
+        with share_of_time(own, f"class {kind}", cut_off), failures_told(notes, kind):
+            losses = _LOSSES if slower else ()
+            for function in _common_functions(quotient, kind, notes, shares, losses):  # kept, whatever comes after
+                functions.append(function)
     if closed is not None and not any(_worth(quotient, V, shares) >= closed.rate for V in functions):
         functions.append(closed)
     functions.sort(key=lambda V: (-_worth(quotient, V, shares), V.overshoot))
-    return FamilySearch(tuple(functions), tuple(notes), tuple(cut_off))
+    return CommonFormSearch(tuple(functions), tuple(notes), tuple(cut_off))
 
 
 def _closed_function(quotient: Quotient, cut_off: list[str]) -> CommonForm | None:
@@ -190,15 +186,12 @@ def _common_functions(
         for loss in (0.0, *losses):
             if condition <= _GOOD_CONDITION or (loss and not top > 0):
                 return
-            wanted = [rate - loss * top for rate in goal]
-            try:
-                certificate = least_condition(arrays, wanted, shape=kind) if loss else best
-            except OutOfTime:
-                raise
-            except (LMIError, np.linalg.LinAlgError) as error:  # a smaller rate is easier
-                notes.append(f"class {kind}: {error}")
-                continue
-            if not certificate.condition < _WORTH * condition:
+            certificate: CommonCertificate | None = None if loss else best
+            if loss:
+                wanted = [rate - loss * top for rate in goal]
+                with failures_told(notes, kind):  # a smaller rate is easier
+                    certificate = least_condition(arrays, wanted, shape=kind)
+            if certificate is None or not certificate.condition < _WORTH * condition:
                 continue
             certificate = best_multipliers(certificate, arrays)
             function = prove_certificate(quotient, kind, certificate, moving)

@@ -191,6 +191,18 @@ def prove_ends(P: Matrix) -> tuple[Fraction, Fraction] | None:
     if not any(x for i, row in enumerate(P) for j, x in enumerate(row) if i != j):
         diagonal = [row[i] for i, row in enumerate(P)]
         return (min(diagonal), max(diagonal)) if min(diagonal) > 0 else None
+    return prove_margins(P)
+
+
+def prove_margins(P: Matrix) -> tuple[Fraction, Fraction] | None:
+    """Prove ``0 < lowest I < P < highest I`` strictly, also of a diagonal matrix; None if it fails.
+
+    Examples
+    --------
+    >>> low, high = prove_margins([[Fraction(2), Fraction(0)], [Fraction(0), Fraction(1)]])
+    >>> 0.999 < low < 1, 2 < high < 2.001
+    (True, True)
+    """
     whole, scale = integer_matrix(P)
     rows, identity = integer_rows(whole), np.eye(len(P), dtype=int).tolist()
     size = np.linalg.eigvalsh(np.array(rows, dtype=float))

@@ -41,7 +41,7 @@ from ptcc_certify.lyapunov.common_form_search import search_common_forms
 from ptcc_certify.lyapunov.common_forms import CommonForm
 from ptcc_certify.lyapunov.interval_rows import IntervalRows, least_quotient
 from ptcc_certify.lyapunov.quotient import Quotient
-from ptcc_certify.lyapunov.row_decay import FollowerDecay, follower_decays, follower_nodes
+from ptcc_certify.lyapunov.row_decay import FollowerDecay, follower_decays, follower_nodes, least_rate
 from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
 from ptcc_certify.theorems.kernel import UNKNOWN, Kernel, TooLarge
 
@@ -280,7 +280,7 @@ def _compose(
         for part in parts:
             for v, end in part.ends.items():
                 outside[place[v]] = int(end)
-    gamma = composite_rate(rows, d, outside, _drifts(component.kernel, decay.nodes, parts))
+    gamma = least_rate(rows, d, outside, _drifts(component.kernel, decay.nodes, parts))
     rate = min([rounded(2 * gamma, 53), *(part.function.rate for part in parts)])
     if rate <= 0:
         return None
@@ -304,13 +304,3 @@ def _drifts(kernel: Kernel, followers: np.ndarray, parts: Sequence[LeadingPart])
         else by_code[code]
         for k, code in codes
     ]
-
-
-def composite_rate(rows: IntervalRows, d: np.ndarray, outside: np.ndarray, drifts: Sequence[Fraction]) -> Fraction:
-    """Return the largest ``gamma`` that integers ``d > 0`` and ``e >= 0`` prove for the followers; exact.
-
-    ``drifts`` are ``sum_p |B_kp| q_p``, which are rounded up to multiples of the unit.
-    """
-    pull = rows.pull(np.concatenate([d, outside]))
-    lost = np.array([-(-q // rows.unit) for q in drifts], dtype=object)
-    return least_quotient((pull - lost).ravel(), np.tile(d, rows.modes)) * rows.unit

@@ -23,7 +23,7 @@ import numpy as np
 
 from lmi.dyadic import round_to_bits
 from lmi.errors import LMIError, NoCertificate
-from lmi.sparse_h_matrix import DIRECT_ROWS, SparseHMatrix, solve
+from lmi.sparse_h_matrix import DIRECT_ROWS, positive_vector, smallest_eigenvalue
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import shorten
@@ -117,31 +117,29 @@ class FollowerRows:
         self.n_nodes = family.n_nodes
         self.intervals = IntervalRows.of(family.modes, self.followers)
         self._known = family.graph is not None
-        self.shares = None if shares is None else self.intervals.by_pair(family, self.followers, shares)
+        edges = self.intervals.edge.size
+        self.shares = np.ones(edges) if shares is None else self.intervals.by_pair(family, self.followers, shares)
         self._smallest: dict[Fraction, float] = {}
-        self._policy: Policy | None = None
-        self._take(np.ones(self.followers.size), 1.0)
+        self._set(self.intervals.worst(self._all(np.ones(self.followers.size)), 1.0))
 
     @property
     def least_share(self) -> Fraction:
         """The least positive share of an edge; 1 if there is none."""
-        positive = np.ones(0) if self.shares is None else self.shares[self.shares > 0]
-        return Fraction(float(positive.min(initial=1.0)))
-
-    def heard(self, q: float) -> Any:
-        """Return ``|W_F|`` of the member at hand times ``q``, to the power of the share of every edge."""
-        if self.shares is None:
-            return q * self.W
-        target, source, weights, shares = self._edges
-        return _csr(target, source, weights * q**shares, self.D.size)
+        return Fraction(float(self.shares[self.shares > 0].min(initial=1.0)))
 
     def by_age(self) -> dict[float, Any]:
         """Return ``|W_F|`` of the member at hand in parts, edges of one share each."""
-        if self.shares is None:
-            return {1.0: self.W}
-        target, source, weights, shares = self._edges
-        ages = ((float(x), shares == x) for x in np.unique(shares))
-        return {x: _csr(target[on], source[on], weights[on], self.D.size) for x, on in ages}
+        ages = np.unique(self._inner_shares()).tolist()
+        return {x: self._heard((self.shares == x).astype(float)) for x in ages}
+
+    def _heard(self, times: float | np.ndarray = 1.0) -> Any:
+        """Return ``|W_F|`` of the member at hand, each entry times what belongs to its edge."""
+        return self.intervals.heard(self._policy, times)[:, : self.intervals.n]
+
+    def _inner_shares(self) -> np.ndarray:
+        """Return the shares of edges among followers, in the member at hand."""
+        _, source, _, place = self.intervals.edges_of(self._policy)
+        return np.asarray(self.shares[place[source < self.D.size]])
 
     def share(self, u: np.ndarray) -> np.ndarray:
         """Return ``(|W_F| u)_k / (D_k u_k)`` for every follower, in the member at hand."""
@@ -157,17 +155,18 @@ class FollowerRows:
             least = min(least, float(self.share(np.maximum(u, 1e-200)).max()))
         if not least > 0:
             return math.inf
-        return 1 / least if self.shares is None or u.size > DIRECT_ROWS else self._largest_power(1 / least, u)
+        alike = bool((self.shares == 1).all()) or u.size > DIRECT_ROWS
+        return 1 / least if alike else self._largest_power(1 / least, u)
 
     def _largest_power(self, q: float, u: np.ndarray) -> float:
         """Return a larger ``q`` than one that serves if all edges have share 1, where some have less."""
-        positive = self._edges[3][self._edges[3] > 0]
-        if not positive.size:
+        inner = self._inner_shares()
+        if not (inner > 0).any():
             return math.inf
-        low, high = math.log(max(q, 1.0)), min(math.log(max(q, 1.0)) / float(positive.min()), math.log(_LARGEST))
+        low, high = math.log(max(q, 1.0)), min(math.log(max(q, 1.0)) / inner[inner > 0].min(), math.log(_LARGEST))
         for _ in range(_HALVINGS):
             middle = (low + high) / 2
-            heard = self.heard(math.exp(middle))
+            heard = self._heard(math.exp(middle) ** self.shares)
             for _ in range(_PRODUCTS):
                 u = np.maximum(u + (heard @ u) / self.D, 1e-200)
                 u /= u.max()
@@ -187,29 +186,15 @@ class FollowerRows:
     def _vector(self, q: Fraction, loss: float) -> np.ndarray:
         """Return ``u`` in floats: that of one member after the other, each the worst for the last, until it stands."""
         for _ in range(_POLICIES):
-            A = SparseHMatrix(_with_diagonal(self.D, self.heard(float(q))))
+            M = self.intervals.system(self._policy, float(q) ** self.shares)
             if q not in self._smallest:
-                self._smallest[q] = A.smallest() if self.D.size <= DIRECT_ROWS else self._roughly_smallest(A)
-            t, ones = self._smallest[q] * (1 - loss), np.ones(self.D.size)
-            shifted = A.M - t * _identity(ones.size)
-            u = solve(shifted, ones, np.maximum(self.D - t, self.D * 1e-3), _LOOSE / math.sqrt(ones.size))
+                self._smallest[q] = _smallest(M)
+            u = positive_vector(M, self._smallest[q] * (1 - loss))
             if not (np.isfinite(u).all() and u.min() > 1e-280 * u.max()):
                 raise NoCertificate(f"no positive vector for q = {float(q):.6g}")
             if not self._take(u, float(q)):
                 break
         return np.asarray(u)
-
-    def _roughly_smallest(self, A: SparseHMatrix) -> float:
-        """Bound the smallest eigenvalue from below by a few loose solves, for many followers."""
-        y, low = np.ones(self.D.size), 0.0
-        for _ in range(_ROUNDS):
-            y = np.abs(solve(A.M, y / y.max(), self.D, _LOOSE / math.sqrt(y.size)))
-            if not (np.isfinite(y).all() and y.min() > 0):
-                break
-            low = max(low, float(((A.M @ y) / y).min()))
-        if not low > 0:
-            raise NoCertificate("followers decay too slowly for Krylov solves to tell")
-        return low
 
     def rounded(self, q: Fraction, u: np.ndarray) -> RowWitness:
         """Return the witness of a vector, rounded, with the largest ``b`` that leaves room for rounding.
@@ -281,31 +266,23 @@ class FollowerRows:
 
     def _least(self, u: np.ndarray, q: float) -> np.ndarray:
         """Return ``sum_l |w_kl| (u_k - q^share u_l)`` of every follower, at least."""
-        return np.asarray(self.intervals.pull(self._all(u), self._times(q)).min(axis=0))
-
-    def _times(self, q: float) -> Any:
-        """Return ``q`` to the power of the share of every edge."""
-        return q if self.shares is None else q**self.shares
+        return np.asarray(self.intervals.pull(self._all(u), q**self.shares).min(axis=0))
 
     def _all(self, u: np.ndarray) -> np.ndarray:
         return np.concatenate([u, np.zeros(self.intervals.outside)])
 
     def _take(self, u: np.ndarray, q: float) -> bool:
         """Take the member whose rows are the worst for ``u``; tell whether it is another."""
-        if self._known and self._policy is not None:
-            return False
-        policy = self.intervals.worst(self._all(u), self._times(q))
+        policy = self._policy if self._known else self.intervals.worst(self._all(u), q**self.shares)
         if policy == self._policy:
             return False
+        self._set(policy)
+        return True
+
+    def _set(self, policy: Policy) -> None:
         self._policy = policy
         self._smallest.clear()
-        target, source, weights, edge = self.intervals.edges_of(policy)
-        self.D = np.bincount(target, weights, self.followers.size).astype(float)
-        inside = source < self.followers.size
-        shares = np.ones(edge.size) if self.shares is None else self.shares[edge]
-        self._edges = target[inside], source[inside], weights[inside], shares[inside]
-        self.W: Any = _csr(*self._edges[:3], self.D.size)
-        return True
+        self.D, self.W = self.intervals.in_weights(policy), self._heard()
 
 
 def listeners(family: Family) -> np.ndarray:
@@ -341,19 +318,14 @@ def refuse_other_targets(family: Family) -> None:
             )
 
 
-def _csr(target: np.ndarray, source: np.ndarray, weights: np.ndarray, n: int) -> Any:
-    from scipy import sparse
-
-    return sparse.csr_array((weights, (target, source)), shape=(n, n))
-
-
-def _with_diagonal(D: np.ndarray, W: Any) -> Any:
-    from scipy import sparse
-
-    return sparse.csr_array(sparse.diags_array(D) - W)
-
-
-def _identity(n: int) -> Any:
-    from scipy import sparse
-
-    return sparse.eye_array(n, format="csr")
+def _smallest(M: Any) -> float:
+    """Bound the smallest eigenvalue from below, of many rows by a few loose solves."""
+    n = M.shape[0]
+    found = (
+        smallest_eigenvalue(M)
+        if n <= DIRECT_ROWS
+        else smallest_eigenvalue(M, rounds=_ROUNDS, residual=_LOOSE / math.sqrt(n))
+    )
+    if found is None:
+        raise NoCertificate("followers decay too slowly for solves to tell")
+    return found[0]

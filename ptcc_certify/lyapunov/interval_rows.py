@@ -217,20 +217,25 @@ class IntervalRows:
         on = np.flatnonzero((self.mode == policy.mode[self.target]) & (weights > 0))
         return self.target[on], self.source[on], weights[on], on
 
-    def system(self, policy: Policy) -> tuple[Any, Any]:
-        """Return ``M`` (n, n) and ``N`` (n, outside), in floats: ``M y - N z`` are the rows under a policy."""
+    def in_weights(self, policy: Policy) -> np.ndarray:
+        """Return ``sum_l |w_kl|`` of every row under a policy, in floats."""
+        target, _, weights, _ = self.edges_of(policy)
+        return np.bincount(target, weights, self.n).astype(float)  # of no edges they are integers
+
+    def heard(self, policy: Policy, times: float | np.ndarray = 1.0) -> Any:
+        """Return ``|w_kl|`` under a policy, (n, n + outside), in floats, each times what belongs to its edge."""
         from scipy import sparse
 
-        target, source, weights, _ = self.edges_of(policy)
-        inside = source < self.n
-        diagonal = np.bincount(target, weights, self.n).astype(float)  # of no edges they are integers
-        M = sparse.csr_array(
-            (-weights[inside], (target[inside], source[inside])), shape=(self.n, self.n)
-        ) + sparse.diags_array(diagonal)
-        N = sparse.csr_array(
-            (weights[~inside], (target[~inside], source[~inside] - self.n)), shape=(self.n, self.outside)
-        )
-        return sparse.csr_array(M), N
+        target, source, weights, place = self.edges_of(policy)
+        weights = weights * (times[place] if isinstance(times, np.ndarray) else times)
+        on = weights > 0
+        return sparse.csr_array((weights[on], (target[on], source[on])), shape=(self.n, self.n + self.outside))
+
+    def system(self, policy: Policy, times: float | np.ndarray = 1.0) -> Any:
+        """Return ``M`` (n, n) in floats: rows under a policy are ``M y``, less what is heard from outside the block."""
+        from scipy import sparse
+
+        return sparse.csr_array(sparse.diags_array(self.in_weights(policy)) - self.heard(policy, times)[:, : self.n])
 
     def lifted(self) -> IntervalRows:
         """Return the rows of ``(y, -y)``: node ``k`` of both numbers, ``-y_k`` as number ``n + k``, edges positive.

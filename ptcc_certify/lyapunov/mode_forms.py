@@ -21,7 +21,6 @@ import numpy as np
 from lmi.common_lyapunov import CommonCertificate, best_multipliers, common_lyapunov, evaluate
 from lmi.definiteness_proofs import prove_generalized_margin
 from lmi.dyadic import round_to_bits
-from lmi.errors import LMIError, OutOfTime
 from lmi.exact.elementary_enclosures import rounded
 from lmi.search_time import checkpoint
 from lmi.switched import SwitchedCertificate, switched_lyapunov
@@ -30,6 +29,7 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.common_forms import CommonForm, prove_ends, prove_mode, with_constants
 from ptcc_certify.lyapunov.error_system import rounded_matrix
 from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.search_failures import failures_told
 from ptcc_certify.theorems.matrix_arithmetic import Matrix
 
 #: Rows up to which forms are searched, of one mode and of all together, and modes.
@@ -113,13 +113,9 @@ def search_mode_forms(quotient: Quotient, price: float, known: Sequence[CommonFo
     (True, True)
     """
     modes = [mode.array for mode in quotient.modes]
-    try:
-        with np.errstate(all="ignore"):
-            return prove_mode_forms(quotient, switched_lyapunov(modes, price, start=_start(modes, known)))
-    except OutOfTime:
-        raise
-    except (LMIError, np.linalg.LinAlgError):
-        return None
+    with np.errstate(all="ignore"), failures_told([], "full"):
+        return prove_mode_forms(quotient, switched_lyapunov(modes, price, start=_start(modes, known)))
+    return None
 
 
 def search_single_forms(quotient: Quotient) -> ModeForms | None:
@@ -133,14 +129,10 @@ def search_single_forms(quotient: Quotient) -> ModeForms | None:
     [6.0, 2.0]
     """
     found = []
-    for mode in quotient.modes:
-        try:
-            with np.errstate(all="ignore"):
-                found.append(best_multipliers(common_lyapunov([mode.array]), [mode.array]))
-        except OutOfTime:
-            raise
-        except (LMIError, np.linalg.LinAlgError):
-            return None
+    with np.errstate(all="ignore"), failures_told([], "full"):
+        found = [best_multipliers(common_lyapunov([mode.array]), [mode.array]) for mode in quotient.modes]
+    if not found:
+        return None
     certificate = SwitchedCertificate(
         tuple(c.matrix for c in found), tuple(c.rate for c in found), tuple(c.multipliers[0] for c in found), 1.0
     )

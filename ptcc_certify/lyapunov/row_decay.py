@@ -19,7 +19,7 @@ docs/theory/families.md, "Rows". Howard, Dynamic Programming and Markov Processe
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
@@ -175,8 +175,13 @@ def prove_follower_decay(rows: IntervalRows, nodes: np.ndarray, d: np.ndarray) -
     return FollowerDecay(nodes, whole, rounded(rate, 53)) if rate > 0 else None
 
 
-def least_rate(rows: IntervalRows, d: np.ndarray) -> Fraction:
+def least_rate(
+    rows: IntervalRows, d: np.ndarray, outside: np.ndarray | None = None, drifts: Sequence[Fraction] = ()
+) -> Fraction:
     """Return the largest ``alpha`` that positive integers ``d`` prove; exact.
+
+    ``sum_l |w_kl| (d_k - d_l) - drift_k >= alpha d_k``, with ``d_l`` of nodes outside as given, 0 by default. Drifts
+    are rounded up to multiples of the unit.
 
     Examples
     --------
@@ -184,7 +189,10 @@ def least_rate(rows: IntervalRows, d: np.ndarray) -> Fraction:
     >>> least_rate(rows, np.array([1, 2])), least_rate(rows, np.array([2, 1]))
     (Fraction(1, 2), Fraction(-3, 1))
     """
-    pull = rows.pull(np.concatenate([d, np.zeros(rows.outside, dtype=np.int64).astype(d.dtype)]))
+    outside = np.zeros(rows.outside, dtype=np.int64).astype(d.dtype) if outside is None else outside
+    pull = rows.pull(np.concatenate([d, outside]))
+    if any(drifts):
+        pull = pull - np.array([-(-q // rows.unit) for q in drifts], dtype=object)
     return least_quotient(pull.ravel(), np.tile(d, rows.modes)) * rows.unit
 
 
@@ -198,7 +206,7 @@ def _extended(rows: IntervalRows, d: np.ndarray) -> np.ndarray:
 def _vector(rows: IntervalRows, t: float, policy: Policy) -> tuple[np.ndarray | None, Policy]:
     """Return ``d`` that proves a rate above ``t``, or None, and the last policy: refused, its member is slower."""
     for _ in range(_ROUNDS):
-        d = positive_vector(rows.system(policy)[0], t)
+        d = positive_vector(rows.system(policy), t)
         if not (np.isfinite(d).all() and (d > 0).all() and d.max() < 1e250 * d.min()):
             return None, policy
         if (rows.pull(_extended(rows, d)) >= t * d).all():
@@ -215,7 +223,7 @@ def _largest_rate(rows: IntervalRows) -> tuple[float, list[Policy]] | None:
     policy = rows.worst(_extended(rows, np.ones(rows.n)))
     low, refused = 0.0, policy
     for _ in range(_ROUNDS):
-        found = smallest_eigenvalue(rows.system(policy)[0], shifted=True)
+        found = smallest_eigenvalue(rows.system(policy), shifted=True)
         if found is None:
             return None
         high = found[0] * (1 - _NEAR)
@@ -230,7 +238,7 @@ def _largest_rate(rows: IntervalRows) -> tuple[float, list[Policy]] | None:
     if low:
         d, refused = _vector(rows, high, policy)
         if d is not None:
-            low, high = high, float(rows.system(policy)[0].diagonal().min())
+            low, high = high, float(rows.system(policy).diagonal().min())
     for _ in range(_TRIALS):
         if high <= low * (1 + _TOLERANCE):
             break
@@ -261,7 +269,7 @@ def _rate_of_member(rows: IntervalRows, policy: Policy) -> Fraction | None:
     """
     from scipy.sparse.csgraph import connected_components
 
-    M, _ = rows.system(policy)
+    M = rows.system(policy)
     _, strong = connected_components(M, directed=True, connection="strong")
     size = np.bincount(strong)
     diagonal = M.diagonal()

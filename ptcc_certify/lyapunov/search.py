@@ -23,16 +23,15 @@ import numpy as np
 import lmi
 import lmi.full
 from lmi.child_process import apart
-from lmi.definiteness_proofs import prove_generalized_margin
-from lmi.errors import LMIError, OutOfTime
 from lmi.matrix_classes import block_columns
 from lmi.search_time import checkpoint, part_of_time, share_of_time
-from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.lyapunov.common_forms import prove_margins
 from ptcc_certify.lyapunov.dominance import dominant_functions
 from ptcc_certify.lyapunov.error_system import ErrorSystem, rounded_diagonal, rounded_matrix
 from ptcc_certify.lyapunov.function import LyapunovBlock, LyapunovFunction
+from ptcc_certify.lyapunov.search_failures import failures_told
 from ptcc_certify.model.asks import METHODS
 from ptcc_certify.theorems.lemmas import laplacian_spectrum, left_vector
 from ptcc_certify.theorems.matrix_arithmetic import BITS, diagonal_matrix
@@ -143,16 +142,11 @@ def search_functions(system: ErrorSystem, method: str, clocks: Sequence[float], 
             if method not in (kind, "best"):
                 continue
             frontier = results[kind] = []
-            with share_of_time(share, f"class {kind}", cut_off):
-                try:
-                    for candidate in apart(search) if len(system.nodes) > APART_NODES else search():
-                        frontier.append(candidate)
-                except OutOfTime:
-                    raise
-                except (LMIError, HypothesisError, np.linalg.LinAlgError) as error:
-                    notes.append(f"class {kind}: {error}")
-                    continue
-            if not frontier and f"class {kind}" not in cut_off:
+            told = len(notes)
+            with share_of_time(share, f"class {kind}", cut_off), failures_told(notes, kind):
+                for candidate in apart(search) if len(system.nodes) > APART_NODES else search():
+                    frontier.append(candidate)
+            if not frontier and f"class {kind}" not in cut_off and len(notes) == told:
                 notes.append(f"class {kind}: nothing was found in floating point")
     with np.errstate(all="ignore"):
         every = [c for kind in METHODS for c in results.get(kind, ())]
@@ -216,12 +210,8 @@ def search_large(structure: Structure, method: str, clocks: Sequence[float]) -> 
     cut_off: list[str] = []
     for kind, search in searches.items():
         frontier: Sequence[LyapunovFunction] = ()
-        try:
-            with np.errstate(all="ignore"), share_of_time(1.0, f"class {kind}", cut_off):
-                frontier = list(apart(partial(dominant_functions, structure, search=search)))
-        except (LMIError, HypothesisError, np.linalg.LinAlgError) as error:
-            notes.append(f"class {kind}: {error}")
-            continue
+        with np.errstate(all="ignore"), share_of_time(1.0, f"class {kind}", cut_off), failures_told(notes, kind):
+            frontier = list(apart(partial(dominant_functions, structure, search=search)))
         rates = [float(V.proved_rate) for V in frontier]
         functions.update((Candidate(kind, r, float(V.overshoot)), V) for r, V in zip(rates, frontier, strict=True))
         if frontier:
@@ -284,7 +274,7 @@ def _without_hair_splitting(functions: list[LyapunovFunction]) -> list[LyapunovF
 
 def prove_function(system: ErrorSystem, candidate: Candidate) -> LyapunovFunction | None:
     """Round a candidate to rationals and prove its rate and overshoot constant exactly; None if a step fails."""
-    ends = None
+    ends: tuple[Fraction, Fraction] | None = None
     if candidate.log_weights is not None:
         weights = rounded_diagonal(candidate.log_weights, BITS)
         if min(weights) <= 0:
@@ -297,14 +287,8 @@ def prove_function(system: ErrorSystem, candidate: Candidate) -> LyapunovFunctio
     rate = system.prove_rate(P, candidate.rate)
     if rate is None:
         return None
-    if block.matrix is not None:
-        size = np.linalg.eigvalsh(np.array([[float(x) for x in row] for row in P]))
-        whole, identity = [[x.numerator for x in row] for row in P], np.eye(len(P), dtype=int).tolist()
-        lowest = prove_generalized_margin(whole, identity, float(size[0]))
-        minus_highest = prove_generalized_margin([[-x for x in row] for row in whole], identity, -float(size[-1]))
-        if lowest is None or lowest <= 0 or minus_highest is None:
-            return None
-        ends = (lowest, -minus_highest)
+    if block.matrix is not None and (ends := prove_margins(P)) is None:
+        return None
     return LyapunovFunction(candidate.kind, "E", (block,), rate=rate, ends=ends, numerical_rate=candidate.rate)
 
 

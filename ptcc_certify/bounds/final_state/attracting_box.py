@@ -254,7 +254,7 @@ def _largest(lifted: IntervalRows, z: np.ndarray) -> tuple[np.ndarray, Policy]:
     y = np.full(lifted.n, max(float(ends.max(initial=0)), 0.0))
     policy = lifted.worst(np.concatenate([y, ends]))
     for _ in range(_ROUNDS):
-        M, N = lifted.system(policy)
+        M, N = lifted.system(policy), lifted.heard(policy)[:, lifted.n :]
         y = np.clip(solve(M, N @ ends, M.diagonal(), _RESIDUAL), -top, top)
         new = lifted.worst(np.concatenate([y, ends]))
         if new == policy or not np.isfinite(y).all():
@@ -271,7 +271,7 @@ def _repair(rows: IntervalRows, d: np.ndarray) -> np.ndarray:
     policy = rows.worst(np.concatenate([np.ones(rows.n), none]))
     with np.errstate(all="ignore"):
         for _ in range(_ROUNDS):
-            M, _ = rows.system(policy)
+            M = rows.system(policy)
             v = solve(M, total, M.diagonal(), _RESIDUAL)
             if not (np.isfinite(v).all() and (v > 0).all()):
                 return d

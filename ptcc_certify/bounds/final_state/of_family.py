@@ -280,7 +280,7 @@ def _solve(rows: IntervalRows, policy: Policy, z: np.ndarray, root: int) -> tupl
     h = np.zeros(rows.n)
     if rows.n == 1:
         return h, float(z[0])
-    M, _ = rows.system(policy)
+    M = rows.system(policy)
     rest = np.flatnonzero(np.arange(rows.n) != root)
     block = M[rest][:, rest]
     diagonal = block.diagonal()
