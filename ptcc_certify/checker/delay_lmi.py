@@ -31,11 +31,11 @@ from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.input import Verified, proved_above
 from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above, root_above
 from ptcc_certify.checker.late_form import LARGEST_GROWTH
-from ptcc_certify.checker.late_input import Inputs
 from ptcc_certify.checker.matrix_products import Matrix, Sparse, need_rows, quadratic, times
 from ptcc_certify.checker.messages_asked import PARTS, Messages
 from ptcc_certify.checker.reading import RejectedError, length, need
 from ptcc_certify.checker.section_declarations import FewAgents, Several, Triangle
+from ptcc_certify.checker.stated_bounds import Inputs
 
 Row = dict[int, Fraction]
 #: How often the bounds of ``|F_k|`` are put into themselves.

@@ -16,13 +16,13 @@ from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.input import Verified, proved_above
-from ptcc_certify.checker.late_input import Inputs
 from ptcc_certify.checker.lyapunov_form import Form
 from ptcc_certify.checker.matrix_products import quadratic
 from ptcc_certify.checker.messages_asked import Messages
 from ptcc_certify.checker.reading import RejectedError, length, need
 from ptcc_certify.checker.section_declarations import FewAgents
 from ptcc_certify.checker.side_files import Numbers
+from ptcc_certify.checker.stated_bounds import Inputs
 
 #: Largest ``b gain_cap delay``; what is larger asks for a ``q`` that nothing allows.
 LARGEST_GROWTH = 1000

@@ -13,12 +13,12 @@ from ptcc_certify.checker.digraph import edges_of
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.late_form import Constants, function_of, initial_value
-from ptcc_certify.checker.late_input import Inputs
 from ptcc_certify.checker.messages_asked import Messages, need_left
 from ptcc_certify.checker.reading import length, need
 from ptcc_certify.checker.rows import away_of
 from ptcc_certify.checker.section_declarations import FewAgents, Positive
 from ptcc_certify.checker.side_files import Numbers
+from ptcc_certify.checker.stated_bounds import Inputs
 from ptcc_certify.checker.structure import Structure
 
 
