@@ -12,6 +12,7 @@ from ptcc_certify.checker.agents import AgentsSection
 from ptcc_certify.checker.attracting_boxes import AttractingBox, KeptBox
 from ptcc_certify.checker.constrained_switching import KeptMean, Section
 from ptcc_certify.checker.delay_lmi import LateLMIWitness
+from ptcc_certify.checker.delayed_forms import LateFormWitness, SettlingWitness
 from ptcc_certify.checker.dominance import DominanceWitness
 from ptcc_certify.checker.family import (
     Counterexample,
@@ -28,7 +29,6 @@ from ptcc_certify.checker.family_squares import FactorWitness
 from ptcc_certify.checker.final_state import AgentsVector, FormationSection, InfluenceSection
 from ptcc_certify.checker.graph import GraphSection
 from ptcc_certify.checker.input import EnergyWitness, InputSection, PeakWitness
-from ptcc_certify.checker.late_form import LateFormWitness
 from ptcc_certify.checker.late_messages import MessagesSection, StepsStart
 from ptcc_certify.checker.lyapunov import FunctionsSection
 from ptcc_certify.checker.missed_deadline import Signs
@@ -46,7 +46,6 @@ from ptcc_certify.checker.section_declarations import (
     Sha256,
     Unread,
 )
-from ptcc_certify.checker.settling_leaders import SettlingWitness
 from ptcc_certify.checker.signal_bounds import FamilyInput
 from ptcc_certify.checker.structure import ClaimSection, ComponentSection, ManyComponents, StructureSection
 from ptcc_certify.checker.theorem_function import PaperSection

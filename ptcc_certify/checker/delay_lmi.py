@@ -27,11 +27,11 @@ from lmi.exact.definite import Arithmetic
 from lmi.exact.elementary_enclosures import exp, rounded
 from lmi.exact.numbers import integers, longest
 from lmi.exact.work import spend
+from ptcc_certify.checker.delayed_forms import LARGEST_GROWTH
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import combination
 from ptcc_certify.checker.input import Verified, proved_above
 from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above, root_above
-from ptcc_certify.checker.late_form import LARGEST_GROWTH
 from ptcc_certify.checker.matrix_products import Matrix, Sparse, need_rows, quadratic, times
 from ptcc_certify.checker.messages_asked import PARTS, Messages
 from ptcc_certify.checker.reading import RejectedError, length, need

@@ -11,13 +11,13 @@ from lmi.exact.decimal_rounding import down
 from lmi.exact.work import spend
 from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.delay_lmi import LateLMI, check_delay_lmi
+from ptcc_certify.checker.delayed_forms import LateForm, SettlingSection, check_form, check_settling
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import Family
 from ptcc_certify.checker.graph import MANY_EDGES
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.input_formulas import clock_between, drift_above
-from ptcc_certify.checker.late_form import LateForm, check_form
 from ptcc_certify.checker.late_steps import FIXED, Steps
 from ptcc_certify.checker.messages_asked import Delays, Messages, Moving, check_delays, need_left
 from ptcc_certify.checker.missed_deadline import MissedDeadline, check_missed, check_staged
@@ -25,7 +25,6 @@ from ptcc_certify.checker.protocol import Begin, Protocol
 from ptcc_certify.checker.reading import length, need
 from ptcc_certify.checker.rows import Followers, Rows, followers_of
 from ptcc_certify.checker.section_declarations import Agents, ByFollower, FollowerNumbers, Positive, Several
-from ptcc_certify.checker.settling_leaders import SettlingSection, check_settling
 from ptcc_certify.checker.stated_bounds import Decay, Inputs, Residual, Stated, Vehicles, VehiclesSection
 
 #: Witnesses of rows, and instants of steps, that are read.
