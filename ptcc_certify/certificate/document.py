@@ -47,9 +47,9 @@ from ptcc_certify.checker.family_rows import FamilyFunctionsSection
 from ptcc_certify.checker.final_state import FormationSection, InfluenceSection
 from ptcc_certify.checker.input import EnergyWitness, InputSection
 from ptcc_certify.checker.late_messages import MessagesSection
+from ptcc_certify.checker.lyapunov import OvershootSection, RatesSection
 from ptcc_certify.checker.obligations import CheckReport
 from ptcc_certify.checker.protocol import ReachingTimes, SlidingPart
-from ptcc_certify.checker.rates import OvershootSection, RatesSection
 from ptcc_certify.checker.section_declarations import Ball, ByAgent, Several
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.signal_bounds import FamilyInput

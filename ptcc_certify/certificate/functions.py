@@ -20,8 +20,7 @@ from ptcc_certify.checker.dominance import FactorSection
 from ptcc_certify.checker.family_function import FormSection, MeanSection, Multipliers
 from ptcc_certify.checker.family_rows import PartSection, RowsSection
 from ptcc_certify.checker.family_squares import FactorWitness, SquaresSection
-from ptcc_certify.checker.lyapunov import DeviationSection, FunctionSection
-from ptcc_certify.checker.rates import MeanWitness, OvershootSection, RatesSection
+from ptcc_certify.checker.lyapunov import DeviationSection, FunctionSection, MeanWitness, OvershootSection, RatesSection
 from ptcc_certify.checker.reading import Interval, exact
 from ptcc_certify.checker.side_files import Numbers, SideFiles
 from ptcc_certify.checker.theorem_function import BlockSection, PaperSection, RhoInterval

@@ -30,10 +30,9 @@ from ptcc_certify.checker.final_state import AgentsVector, FormationSection, Inf
 from ptcc_certify.checker.graph import GraphSection
 from ptcc_certify.checker.input import EnergyWitness, InputSection, PeakWitness
 from ptcc_certify.checker.late_messages import MessagesSection, StepsStart
-from ptcc_certify.checker.lyapunov import FunctionsSection
+from ptcc_certify.checker.lyapunov import FunctionsSection, InertiaWitness, MeanWitness, OvershootSection, RatesSection
 from ptcc_certify.checker.missed_deadline import Signs
 from ptcc_certify.checker.protocol import NominalSection, ReachingTimes, SlidingSection
-from ptcc_certify.checker.rates import InertiaWitness, MeanWitness, OvershootSection, RatesSection
 from ptcc_certify.checker.section_declarations import (
     Agents,
     Ball,

@@ -30,6 +30,7 @@ from lmi.exact.work import spend
 from ptcc_certify.checker.delayed_forms import LARGEST_GROWTH
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import combination
+from ptcc_certify.checker.final_state import deviation_rows
 from ptcc_certify.checker.input import Verified, proved_above
 from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above, root_above
 from ptcc_certify.checker.matrix_products import Matrix, Sparse, need_rows, quadratic, times
@@ -163,13 +164,8 @@ class LateLoop:
     @cached_property
     def deviations(self) -> list[Row]:
         """The rows of ``(I - Q)``, columns of free coordinates."""
-        rows = []
-        for v, own in enumerate(self.projection):
-            row = {self.place[j]: -x for j, x in own.items() if j in self.place}
-            if v in self.place:
-                row[self.place[v]] = row.get(self.place[v], Fraction(0)) + 1
-            rows.append(row)
-        return rows
+        rows = deviation_rows(self.projection)
+        return [{self.place[j]: x for j, x in row.items() if j in self.place} for row in rows]
 
 
 def channels_of(
