@@ -31,7 +31,8 @@ from ptcc_certify.checker.delayed_forms import LARGEST_GROWTH
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import combination
 from ptcc_certify.checker.final_state import deviation_rows
-from ptcc_certify.checker.input import Verified, proved_above
+from ptcc_certify.checker.graph import proved_above
+from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above, root_above
 from ptcc_certify.checker.matrix_products import Matrix, Sparse, need_rows, quadratic, times
 from ptcc_certify.checker.messages_asked import PARTS, Messages

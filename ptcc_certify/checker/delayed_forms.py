@@ -19,7 +19,8 @@ from lmi.exact.work import spend
 from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.digraph import Digraph, edges_of
 from ptcc_certify.checker.document import Document
-from ptcc_certify.checker.input import Verified, proved_above
+from ptcc_certify.checker.graph import proved_above
+from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.lyapunov_form import Form
 from ptcc_certify.checker.matrix_products import quadratic
 from ptcc_certify.checker.messages_asked import Messages, need_left

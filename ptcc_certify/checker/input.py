@@ -16,6 +16,7 @@ from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.final_state import FinalState, deviation_rows
+from ptcc_certify.checker.graph import proved_above
 from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.checker.matrix_products import (
     Matrix,
@@ -201,13 +202,6 @@ def check_input(doc: Document, verified: Verified) -> None:
                 verify(doc, verified, section, bounds)
     except (ValueError, OverflowError) as error:
         raise RejectedError(str(error)) from None
-
-
-def proved_above(graph: Digraph, values: Numbers, what: str, least: Sequence[Fraction]) -> Numbers:
-    """Return bounds by agent, none of which is below what is proved."""
-    low = next((label for label, x, y in zip(graph.labels, values, least, strict=True) if x < y), None)
-    need(low is None, f"{what} of agent {shorten(low or '')} is not proved")
-    return values
 
 
 # ---------------------------------------------------------------------- bounded or not

@@ -201,7 +201,7 @@ def _check_steps(
     gains = [limits.gain_at(gain, t) for t in instants[:-1]] if messages.leaders is not None else []
     push = messages.leaders.push * scale / gains[0] if messages.leaders is not None else Fraction(0)
     followers.starts_within(values, scale)
-    followers.never_grows(values, error, push)
+    followers.need_outweighed(values, Fraction(1), error, push, "the start of agent {} may grow")
     ways = [clock_between(gain, messages.gain_cap, a, b) for a, b in pairwise(instants)]
     kind, degrees = Steps, [graph.diagonal[v] for v in followers.nodes]
     if doc.exact.numpy and graph.n_edges >= MANY_EDGES:
