@@ -37,8 +37,8 @@ from ptcc_certify.certificate.constrained_switching.claims import (
 )
 from ptcc_certify.certificate.functions import ProvedFunction
 from ptcc_certify.certificate.proof import Proof
-from ptcc_certify.checker.family_ends import WeightedMean, agents_heard, limits
-from ptcc_certify.checker.family_function import Scaled
+from ptcc_certify.checker.common_forms import Scaled
+from ptcc_certify.checker.common_kernel_ends import WeightedMean, agents_heard, limits
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.checker.protocol import last_time, sliding_bounded, sliding_part
 from ptcc_certify.checker.reading import Interval

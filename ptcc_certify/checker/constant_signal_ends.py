@@ -20,10 +20,10 @@ from typing import Literal
 from lmi.exact.decimal_rounding import down, up
 from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import spend
+from ptcc_certify.checker.common_kernel_ends import agents_heard
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import Component, Edge, Family, Mode
-from ptcc_certify.checker.family_ends import agents_heard
 from ptcc_certify.checker.graph import ordered
 from ptcc_certify.checker.reading import RejectedError, need
 from ptcc_certify.checker.rows import WeightsBetween

@@ -15,16 +15,16 @@ from lmi.exact.decimal_rounding import down
 from lmi.exact.definite import Arithmetic
 from lmi.exact.elementary_enclosures import exp, log
 from lmi.exact.work import spend
+from ptcc_certify.checker.common_forms import rates_of_modes
+from ptcc_certify.checker.common_kernel_ends import Mean, check_mean
 from ptcc_certify.checker.constant_signal_ends import FinalValueSection, check_final_value, fitting_camps
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import CONSENSUS, CONTAINMENT, INTERVAL, STABILITY, Component, Family
-from ptcc_certify.checker.family_ends import Mean, check_mean
-from ptcc_certify.checker.family_function import rates_of_modes
-from ptcc_certify.checker.family_rows import Function
 from ptcc_certify.checker.graph import ordered, positions
 from ptcc_certify.checker.matrix_products import Matrix, combined
 from ptcc_certify.checker.protocol import Begin, Protocol
 from ptcc_certify.checker.reading import Interval, need
+from ptcc_certify.checker.row_functions import Function
 from ptcc_certify.checker.section_declarations import Ball, Nodes, NotNegative, Positive, Several, Some, Triangle
 from ptcc_certify.checker.structure import Behaviour
 

@@ -23,7 +23,7 @@ from ptcc_certify.checker.graph import proved_above
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.lyapunov_form import Form
 from ptcc_certify.checker.matrix_products import quadratic
-from ptcc_certify.checker.messages_asked import Messages, need_left
+from ptcc_certify.checker.message_ages import Messages, need_left
 from ptcc_certify.checker.reading import RejectedError, length, need
 from ptcc_certify.checker.rows import away_of
 from ptcc_certify.checker.section_declarations import FewAgents, Positive

@@ -25,7 +25,7 @@ from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import Edge, Family
 from ptcc_certify.checker.input_formulas import BITS
-from ptcc_certify.checker.messages_asked import PARTS
+from ptcc_certify.checker.message_ages import PARTS
 from ptcc_certify.checker.protocol import Begin
 from ptcc_certify.checker.reading import need
 from ptcc_certify.checker.side_files import Numbers

@@ -23,9 +23,9 @@ from lmi.exact.work import WorkError, limited
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker import check, graph
 from ptcc_certify.checker.array_digraph import ArrayDigraph
-from ptcc_certify.checker.array_late_steps import ArraySteps
+from ptcc_certify.checker.array_stepwise_bounds import ArraySteps
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.late_steps import Steps, fixed_decay_above
+from ptcc_certify.checker.stepwise_bounds import Steps, fixed_decay_above
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
@@ -145,7 +145,7 @@ def test_what_follows_is_accepted_with_and_without_arrays_and_has_the_shape_of_t
     data = samples()[name]
     VALIDATOR.validate(data)
     monkeypatch.setattr(graph, "MANY_EDGES", 0)
-    monkeypatch.setattr("ptcc_certify.checker.late_messages.MANY_EDGES", 0)
+    monkeypatch.setattr("ptcc_certify.checker.messages.MANY_EDGES", 0)
     reports = [check(data), check(data, stdlib=True)]
     for report in reports:
         assert report.accepted, (report.rejected, report.reason)

@@ -19,7 +19,7 @@ from math import ceil
 from lmi.exact.numbers import longest, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.messages_asked import PARTS
+from ptcc_certify.checker.message_ages import PARTS
 
 #: Bits of a fixed-point number, of the share of a degree in the largest one, and of the way of the clock.
 FIXED, SHARE, WAY = 30, 40, 42

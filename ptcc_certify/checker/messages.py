@@ -18,14 +18,14 @@ from ptcc_certify.checker.family import Family
 from ptcc_certify.checker.graph import MANY_EDGES
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.input_formulas import clock_between, drift_above
-from ptcc_certify.checker.late_steps import FIXED, Steps
-from ptcc_certify.checker.messages_asked import Delays, Messages, Moving, check_delays, need_left
+from ptcc_certify.checker.message_ages import Delays, Messages, Moving, check_delays, need_left
 from ptcc_certify.checker.missed_deadline import MissedDeadline, check_missed, check_staged
 from ptcc_certify.checker.protocol import Begin, Protocol
 from ptcc_certify.checker.reading import length, need
 from ptcc_certify.checker.rows import Followers, Rows, followers_of
 from ptcc_certify.checker.section_declarations import Agents, ByFollower, FollowerNumbers, Positive, Several
 from ptcc_certify.checker.stated_bounds import Decay, Inputs, Residual, Stated, Vehicles, VehiclesSection
+from ptcc_certify.checker.stepwise_bounds import FIXED, Steps
 
 #: Witnesses of rows, and instants of steps, that are read.
 MANY_ROWS, MANY_INSTANTS = 100, 2001
@@ -205,7 +205,7 @@ def _check_steps(
     ways = [clock_between(gain, messages.gain_cap, a, b) for a, b in pairwise(instants)]
     kind, degrees = Steps, [graph.diagonal[v] for v in followers.nodes]
     if doc.exact.numpy and graph.n_edges >= MANY_EDGES:
-        from ptcc_certify.checker.array_late_steps import ArraySteps as kind  # noqa: N813
+        from ptcc_certify.checker.array_stepwise_bounds import ArraySteps as kind  # noqa: N813
     steps = kind(graph, followers.nodes, degrees, values, error, messages.parts, push)
     bounds = steps.run(instants, messages.delay, ways, gains)
     residual.meet(followers.nodes, (Fraction(steps.largest, scale << FIXED), bounds))
