@@ -13,7 +13,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from ptcc_certify.checker.family_function import Scaled
+from ptcc_certify.checker.common_forms import Scaled
 from ptcc_certify.checker.signal_bounds import least
 from ptcc_certify.graphs.family import Family, Mode
 

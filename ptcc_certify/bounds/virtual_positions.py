@@ -23,8 +23,7 @@ from ptcc_certify.bounds.delay.case import LateCase
 from ptcc_certify.bounds.delay.decay_by_rows import RowBound
 from ptcc_certify.bounds.float_conversion import floats_up
 from ptcc_certify.checker.side_files import Numbers
-from ptcc_certify.checker.stated_bounds import Decay
-from ptcc_certify.checker.virtual_positions import VehiclesSection, coefficients
+from ptcc_certify.checker.stated_bounds import Decay, VehiclesSection, coefficients
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.lyapunov.follower_rows import FollowerRows

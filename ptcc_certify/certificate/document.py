@@ -41,15 +41,15 @@ from ptcc_certify.certificate.unverified_section import write_unverified
 from ptcc_certify.checker import NOT_OF_FAMILIES, SCHEMA, SLIDING_BOUND, SLIDING_CLOCK
 from ptcc_certify.checker.agent_decrease import PhaseSection
 from ptcc_certify.checker.agent_instants import InstantsSection
+from ptcc_certify.checker.common_kernel_ends import EQUAL
 from ptcc_certify.checker.constrained_switching import Section
-from ptcc_certify.checker.family_ends import EQUAL
-from ptcc_certify.checker.family_rows import FamilyFunctionsSection
 from ptcc_certify.checker.final_state import FormationSection, InfluenceSection
 from ptcc_certify.checker.input import EnergyWitness, InputSection
-from ptcc_certify.checker.late_messages import MessagesSection
+from ptcc_certify.checker.lyapunov import OvershootSection, RatesSection
+from ptcc_certify.checker.messages import MessagesSection
 from ptcc_certify.checker.obligations import CheckReport
 from ptcc_certify.checker.protocol import ReachingTimes, SlidingPart
-from ptcc_certify.checker.rates import OvershootSection, RatesSection
+from ptcc_certify.checker.row_functions import FamilyFunctionsSection
 from ptcc_certify.checker.section_declarations import Ball, ByAgent, Several
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.signal_bounds import FamilyInput

@@ -26,9 +26,9 @@ from ptcc_certify.certificate.functions import ProvedFunction
 from ptcc_certify.certificate.request import Question
 from ptcc_certify.checker.constrained_switching import reachable_bounds
 from ptcc_certify.checker.family import MANY_MODES
-from ptcc_certify.checker.family_rows import MANY_FUNCTIONS
 from ptcc_certify.checker.matrix_products import LARGEST_ROWS
 from ptcc_certify.checker.reading import Interval
+from ptcc_certify.checker.row_functions import MANY_FUNCTIONS
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float

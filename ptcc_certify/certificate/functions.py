@@ -16,15 +16,14 @@ from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.certificate.section_io import Reader, Writer, write
 from ptcc_certify.checker import attracting_boxes
 from ptcc_certify.checker.attracting_boxes import KeptBox
+from ptcc_certify.checker.common_forms import FormSection, MeanSection, Multipliers
 from ptcc_certify.checker.dominance import FactorSection
-from ptcc_certify.checker.family_function import FormSection, MeanSection, Multipliers
-from ptcc_certify.checker.family_rows import PartSection, RowsSection
-from ptcc_certify.checker.family_squares import FactorWitness, SquaresSection
-from ptcc_certify.checker.lyapunov import DeviationSection, FunctionSection
-from ptcc_certify.checker.rates import MeanWitness, OvershootSection, RatesSection
+from ptcc_certify.checker.lyapunov import DeviationSection, FunctionSection, MeanWitness, OvershootSection, RatesSection
 from ptcc_certify.checker.reading import Interval, exact
+from ptcc_certify.checker.row_functions import PartSection, RowsSection
 from ptcc_certify.checker.side_files import Numbers, SideFiles
 from ptcc_certify.checker.theorem_function import BlockSection, PaperSection, RhoInterval
+from ptcc_certify.checker.weighted_squares import FactorWitness, SquaresSection
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure

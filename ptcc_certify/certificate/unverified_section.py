@@ -23,7 +23,7 @@ from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.certificate.section_io import Writer, finite, readable, text, write
 from ptcc_certify.checker.constrained_switching import Dwell, Shares, Windows
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
-from ptcc_certify.checker.messages_asked import Delays
+from ptcc_certify.checker.message_ages import Delays
 from ptcc_certify.checker.reading import RejectedError, entries, exact, need
 from ptcc_certify.checker.section_declarations import Context, read
 from ptcc_certify.checker.side_files import SideFiles

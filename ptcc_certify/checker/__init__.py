@@ -29,12 +29,11 @@ from ptcc_certify.checker.constrained_switching import check_restricted
 from ptcc_certify.checker.contents import BRINGS, FamilyCertificate, GraphCertificate
 from ptcc_certify.checker.document import Document, Recorder
 from ptcc_certify.checker.family import check_family
-from ptcc_certify.checker.family_rows import check_family_functions
 from ptcc_certify.checker.final_state import check_final_state, check_formation
 from ptcc_certify.checker.graph import check_graph
 from ptcc_certify.checker.input import INPUT_NODES, Verified, check_input
-from ptcc_certify.checker.late_messages import check_messages
-from ptcc_certify.checker.lyapunov import check_functions
+from ptcc_certify.checker.lyapunov import check_functions, check_rate_bound, check_rates
+from ptcc_certify.checker.messages import check_messages
 from ptcc_certify.checker.obligations import OBLIGATIONS, CheckReport, ProofObligation, VerifiedObligation
 from ptcc_certify.checker.protocol import (
     REACHING_BITS,
@@ -45,8 +44,8 @@ from ptcc_certify.checker.protocol import (
     check_protocol,
     check_sliding,
 )
-from ptcc_certify.checker.rates import check_rate_bound, check_rates
 from ptcc_certify.checker.reading import SCHEMA, RejectedError, UnreadableError, digest, need, read
+from ptcc_certify.checker.row_functions import check_family_functions
 from ptcc_certify.checker.section_declarations import declared
 from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.checker.signal_bounds import check_drive, check_family_bounds

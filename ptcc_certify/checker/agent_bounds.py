@@ -193,7 +193,7 @@ def check_residual(doc: Document, begin: Begin, used: Sequence[Used], section: R
     doc.open("agent-residual", "agents")
     agents, labels = begin.agents, begin.graph.labels
     clock, cap, numbers = section.clock, agents.cap or Fraction(0), section.agents
-    need(clock <= _clock_below(agents), "the clock is not proved")
+    need(clock <= Limits(gain_cap=cap).integrals(agents.gain)[0], "the clock is not proved")
     need(all(len(row) == agents.n for row in numbers), f"derivatives has not {agents.n} entries")
     decay = exp(-min(agents.rate * clock, Fraction(LARGEST_DECAY)))[1]
     powers = [rounded(cap ** (2 * i) * agents.W[i][i] * decay, BITS, up=True) for i in range(agents.n)]
@@ -204,14 +204,6 @@ def check_residual(doc: Document, begin: Begin, used: Sequence[Used], section: R
             holds = x >= 0 and x**2 >= powers[i] * least
             need(holds, f"what is left of agent {shorten(labels[v])} is not proved")
     doc.done(f"positions within {up(max(row[0] for row in numbers))}")
-
-
-def _clock_below(agents: Agents) -> Fraction:
-    """Return a lower bound of the integral of the capped gain up to the deadline; the integral if it never grows."""
-    cap, gain = agents.cap or Fraction(0), agents.gain
-    if cap <= agents.first_gain:
-        return cap * gain.T
-    return Limits(gain_cap=cap).integrals(gain)[0]
 
 
 def check_input(

@@ -20,9 +20,10 @@ from typing import Literal
 from lmi.exact.decimal_rounding import down, up
 from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import spend
+from ptcc_certify.checker.common_kernel_ends import agents_heard
+from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import Component, Edge, Family, Mode
-from ptcc_certify.checker.family_ends import agents_heard
 from ptcc_certify.checker.graph import ordered
 from ptcc_certify.checker.reading import RejectedError, need
 from ptcc_certify.checker.rows import WeightsBetween
@@ -58,20 +59,10 @@ def fitting_camps(nodes: Sequence[int], edges: Sequence[Edge]) -> dict[int, int]
     >>> fitting_camps([0, 1], [(0, 1, -1, 0, 1)]), fitting_camps([0, 1], [(0, 1, -1, 0, 1), (1, 0, 1, 1, 1)])
     ({0: 1, 1: -1}, None)
     """
-    near: dict[int, list[tuple[int, int]]] = {v: [] for v in nodes}
-    for s, t, sign, _, _ in edges:
-        near[s].append((t, sign))
-        near[t].append((s, sign))
-    camp: dict[int, int] = {}
-    for root in nodes:
-        found = [] if root in camp else [root]
-        camp.setdefault(root, 1)
-        for v in found:
-            for u, sign in near[v]:
-                if u not in camp:
-                    camp[u] = sign * camp[v]
-                    found.append(u)
-    return camp if all(camp[t] == sign * camp[s] for s, t, sign, _, _ in edges) else None
+    place = {v: k for k, v in enumerate(nodes)}
+    source, target = ([place[edge[end]] for edge in edges] for end in (0, 1))
+    _, opposite, odd = Digraph.signed_pieces(len(nodes), source, target, [edge[2] < 0 for edge in edges])
+    return None if odd else {v: -1 if against else 1 for v, against in zip(nodes, opposite, strict=True)}
 
 
 def check_final_value(

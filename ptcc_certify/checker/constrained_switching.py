@@ -14,18 +14,17 @@ from typing import Literal
 from lmi.exact.decimal_rounding import down
 from lmi.exact.definite import Arithmetic
 from lmi.exact.elementary_enclosures import exp, log
-from lmi.exact.numbers import integers
 from lmi.exact.work import spend
+from ptcc_certify.checker.common_forms import rates_of_modes
+from ptcc_certify.checker.common_kernel_ends import Mean, check_mean
 from ptcc_certify.checker.constant_signal_ends import FinalValueSection, check_final_value, fitting_camps
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import CONSENSUS, CONTAINMENT, INTERVAL, STABILITY, Component, Family
-from ptcc_certify.checker.family_ends import Mean, check_mean
-from ptcc_certify.checker.family_function import decreases, quotient_of
-from ptcc_certify.checker.family_rows import Function
 from ptcc_certify.checker.graph import ordered, positions
-from ptcc_certify.checker.matrix_products import Matrix, combined, need_rows
+from ptcc_certify.checker.matrix_products import Matrix, combined
 from ptcc_certify.checker.protocol import Begin, Protocol
 from ptcc_certify.checker.reading import Interval, need
+from ptcc_certify.checker.row_functions import Function
 from ptcc_certify.checker.section_declarations import Ball, Nodes, NotNegative, Positive, Several, Some, Triangle
 from ptcc_certify.checker.structure import Behaviour
 
@@ -193,19 +192,12 @@ def _forms(
     pivots = set(component.pivots.values())
     nodes = [v for v in component.nodes if v not in pivots]
     need(bool(nodes), "a form of no agents")
-    need_rows(len(nodes))
-    forms, rates = [], []
     need(len(section) == len(family.modes), f"forms has not {len(family.modes)} entries")
-    for k, rows in enumerate(section):
-        need(len(rows) == len(nodes), f"lower_triangle has not {len(nodes)} entries")
-        form = integers(rows)
-        need(doc.exact.definite(form[0]), "P is not proved definite")
-        numbers = doc.open("family-rate", f"{of}.modes[{k}]")
-        mode = quotient_of(family, k, component, nodes)
-        decreases(doc.exact, mode, form, component.whole[1], numbers["b"], numbers["witness"])
-        doc.done(f"b = {down(numbers['b'])}")
+    forms, rates = [], []
+    for form, _, b in rates_of_modes(doc, family, component, nodes, section, of):
         forms.append(form)
-        rates.append(numbers["b"])
+        rates.append(b)
+        doc.done(f"b = {down(b)}")
     return forms, rates
 
 
@@ -294,8 +286,8 @@ def _check_last_mode(
 def closed_groups(nodes: Sequence[int], edges: Iterable[tuple[int, int, int]]) -> list[tuple[list[int], bool]]:
     """Return the closed strong components of a graph, each with whether it is balanced; a pair may have both signs.
 
-    Nodes are finished by a first search; in the opposite order, a second search begins once in every component that
-    hears nobody else, and this is all that its beginning hears.
+    In each there is one node that no node before reaches. It is among the first ones that are reached from nobody
+    before; and of these, whoever is in no such component is reached from one that is, which comes later.
 
     Examples
     --------
@@ -307,10 +299,16 @@ def closed_groups(nodes: Sequence[int], edges: Iterable[tuple[int, int, int]]) -
     for s, t, sign in edges:
         out[s].append(t)
         into[t].append((s, sign))
-    groups, reached = [], set[int]()
-    for root in reversed(_finished(nodes, out)):
+    first, reached = list[int](), set[int]()
+    for v in nodes:
+        if v not in reached:
+            first.append(v)
+            _reach(out, v, reached)
+    groups, reached = [], set()
+    for root in reversed(first):
         if root in reached:
             continue
+        _reach(out, root, reached)
         camp, found, balanced = {root: 1}, [root], True
         for v in found:
             for u, sign in into[v]:
@@ -319,33 +317,18 @@ def closed_groups(nodes: Sequence[int], edges: Iterable[tuple[int, int, int]]) -
                     found.append(u)
                 balanced &= camp[u] == sign * camp[v]
         groups.append((sorted(found), balanced))
-        ahead = [root]
-        reached.add(root)
-        for v in ahead:
-            for u in out[v]:
-                if u not in reached:
-                    reached.add(u)
-                    ahead.append(u)
     return groups
 
 
-def _finished(nodes: Sequence[int], out: dict[int, list[int]]) -> list[int]:
-    """Return the nodes in the order in which a search in depth leaves them."""
-    order: list[int] = []
-    seen = set[int]()
-    for root in nodes:
-        stack = [] if root in seen else [(root, iter(out[root]))]
-        seen.add(root)
-        while stack:
-            v, rest = stack[-1]
-            following = next((u for u in rest if u not in seen), None)
-            if following is None:
-                order.append(v)
-                stack.pop()
-            else:
-                seen.add(following)
-                stack.append((following, iter(out[following])))
-    return order
+def _reach(out: Mapping[int, Sequence[int]], root: int, reached: set[int]) -> None:
+    """Add to some nodes all that are reached from a root."""
+    ahead = [root]
+    reached.add(root)
+    for v in ahead:
+        for u in out[v]:
+            if u not in reached:
+                reached.add(u)
+                ahead.append(u)
 
 
 def contraction_below(largest: Fraction, least: Fraction, window: Fraction, on: Fraction) -> Fraction:
@@ -437,18 +420,10 @@ def _check_shares(doc: Document, family: Family, x: Sequence[Fraction] | None, e
         common = Component(part, CONSENSUS, kernel, {1: pivots[0]})
     else:
         common = Component(part, STABILITY, {v: {} for v in part.nodes}, {})
-    need_rows(len(nodes))
-    need(len(entry.form) == len(nodes), f"lower_triangle has not {len(nodes)} entries")
-    form = integers(entry.form)
-    need(doc.exact.definite(form[0]), "P is not proved definite")
     mean = Fraction(0)
-    for k, share in enumerate(shares):
-        numbers = doc.open("family-rate", f"{of}.modes[{k}]")
-        decreases(
-            doc.exact, quotient_of(family, k, common, nodes), form, common.whole[1], numbers["b"], numbers["witness"]
-        )
-        mean += share * numbers["b"]
-        doc.done(f"b = {down(numbers['b'])}" if numbers["b"] > 0 else "nothing decays")
+    for share, (_, _, b) in zip(shares, rates_of_modes(doc, family, common, nodes, [entry.form], of), strict=True):
+        mean += share * b
+        doc.done(f"b = {down(b)}" if b > 0 else "nothing decays")
     witness: KeptMean | None = doc.open("clock-shares", of)["witness"]
     need(told or witness is None, "a witness that nothing asks for")
     rate = entry.rate

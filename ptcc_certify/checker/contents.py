@@ -10,8 +10,11 @@ from ptcc_certify.checker.agent_decrease import PhaseSection
 from ptcc_certify.checker.agent_instants import InstantsSection
 from ptcc_certify.checker.agents import AgentsSection
 from ptcc_certify.checker.attracting_boxes import AttractingBox, KeptBox
+from ptcc_certify.checker.common_forms import Multipliers
+from ptcc_certify.checker.common_kernel_ends import Mean
 from ptcc_certify.checker.constrained_switching import KeptMean, Section
 from ptcc_certify.checker.delay_lmi import LateLMIWitness
+from ptcc_certify.checker.delayed_forms import LateFormWitness, SettlingWitness
 from ptcc_certify.checker.dominance import DominanceWitness
 from ptcc_certify.checker.family import (
     Counterexample,
@@ -21,19 +24,14 @@ from ptcc_certify.checker.family import (
     KernelWitness,
     ModeStructures,
 )
-from ptcc_certify.checker.family_ends import Mean
-from ptcc_certify.checker.family_function import Multipliers
-from ptcc_certify.checker.family_rows import FamilyFunctionsSection
-from ptcc_certify.checker.family_squares import FactorWitness
 from ptcc_certify.checker.final_state import AgentsVector, FormationSection, InfluenceSection
 from ptcc_certify.checker.graph import GraphSection
 from ptcc_certify.checker.input import EnergyWitness, InputSection, PeakWitness
-from ptcc_certify.checker.late_form import LateFormWitness
-from ptcc_certify.checker.late_messages import MessagesSection, StepsStart
-from ptcc_certify.checker.lyapunov import FunctionsSection
+from ptcc_certify.checker.lyapunov import FunctionsSection, InertiaWitness, MeanWitness, OvershootSection, RatesSection
+from ptcc_certify.checker.messages import MessagesSection, StepsStart
 from ptcc_certify.checker.missed_deadline import Signs
 from ptcc_certify.checker.protocol import NominalSection, ReachingTimes, SlidingSection
-from ptcc_certify.checker.rates import InertiaWitness, MeanWitness, OvershootSection, RatesSection
+from ptcc_certify.checker.row_functions import FamilyFunctionsSection
 from ptcc_certify.checker.section_declarations import (
     Agents,
     Ball,
@@ -46,10 +44,10 @@ from ptcc_certify.checker.section_declarations import (
     Sha256,
     Unread,
 )
-from ptcc_certify.checker.settling_leaders import SettlingWitness
 from ptcc_certify.checker.signal_bounds import FamilyInput
 from ptcc_certify.checker.structure import ClaimSection, ComponentSection, ManyComponents, StructureSection
 from ptcc_certify.checker.theorem_function import PaperSection
+from ptcc_certify.checker.weighted_squares import FactorWitness
 
 
 @dataclass(frozen=True, kw_only=True)

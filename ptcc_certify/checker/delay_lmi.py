@@ -27,15 +27,18 @@ from lmi.exact.definite import Arithmetic
 from lmi.exact.elementary_enclosures import exp, rounded
 from lmi.exact.numbers import integers, longest
 from lmi.exact.work import spend
+from ptcc_certify.checker.delayed_forms import LARGEST_GROWTH
 from ptcc_certify.checker.document import Document
-from ptcc_certify.checker.input import Verified, proved_above
+from ptcc_certify.checker.family import combination
+from ptcc_certify.checker.final_state import deviation_rows
+from ptcc_certify.checker.graph import proved_above
+from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above, root_above
-from ptcc_certify.checker.late_form import LARGEST_GROWTH
-from ptcc_certify.checker.late_input import Inputs
 from ptcc_certify.checker.matrix_products import Matrix, Sparse, need_rows, quadratic, times
-from ptcc_certify.checker.messages_asked import PARTS, Messages
+from ptcc_certify.checker.message_ages import PARTS, Messages
 from ptcc_certify.checker.reading import RejectedError, length, need
 from ptcc_certify.checker.section_declarations import FewAgents, Several, Triangle
+from ptcc_certify.checker.stated_bounds import Inputs
 
 Row = dict[int, Fraction]
 #: How often the bounds of ``|F_k|`` are put into themselves.
@@ -111,9 +114,15 @@ class LateLoop:
             for row in self.projection
         ]
 
+    @cached_property
+    def differences(self) -> list[Row]:
+        """The rows of ``C``, by node."""
+        each = ((v, self.camps[v].items()) for v in self.free)
+        return [{v: Fraction(1), **{self.first[k]: -r for k, r in camps}} for v, camps in each]
+
     def coordinates(self, x: Sequence[Fraction]) -> list[Fraction]:
         """Return ``C x``."""
-        return [x[v] - sum((r * x[self.first[j]] for j, r in self.camps[v].items()), Fraction(0)) for v in self.free]
+        return [sum((r * x[v] for v, r in row.items()), Fraction(0)) for row in self.differences]
 
     @cached_property
     def system(self) -> list[Row]:
@@ -122,26 +131,15 @@ class LateLoop:
         own = longest(chain(*map(dict.values, self.laplacian)))
         added = sum(len(self.laplacian[self.first[k]]) for row in self.camps for k in row)
         spend(added, bits * max(len(self.first), 1), own + self.unit.bit_length(), "the delay LMI")
-        rows = []
-        for v in self.free:
-            row = {self.place[j]: Fraction(x, self.unit) for j, x in self.laplacian[v].items() if j in self.place}
-            for k, r in self.camps[v].items():
-                for j, x in self.laplacian[self.first[k]].items():
-                    if j in self.place:
-                        row[self.place[j]] = row.get(self.place[j], Fraction(0)) - r * Fraction(x, self.unit)
-            rows.append(row)
-        return rows
+        place, unit = self.place, self.unit
+        rows = [{place[j]: Fraction(x, unit) for j, x in row.items() if j in place} for row in self.laplacian]
+        return [combination(row, dict(enumerate(rows))) for row in self.differences]
 
     @cached_property
     def pushed(self) -> list[Row]:
         """The rows of ``C``, columns of :attr:`listeners`."""
         column = {v: k for k, v in enumerate(self.listeners)}
-        rows = []
-        for v in self.free:
-            row = {column[v]: Fraction(1)} if v in column else {}
-            row |= {column[self.first[k]]: -r for k, r in self.camps[v].items() if self.first[k] in column}
-            rows.append(row)
-        return rows
+        return [{column[v]: r for v, r in row.items() if v in column} for row in self.differences]
 
     @cached_property
     def walks(self) -> dict[int, Row]:
@@ -167,13 +165,8 @@ class LateLoop:
     @cached_property
     def deviations(self) -> list[Row]:
         """The rows of ``(I - Q)``, columns of free coordinates."""
-        rows = []
-        for v, own in enumerate(self.projection):
-            row = {self.place[j]: -x for j, x in own.items() if j in self.place}
-            if v in self.place:
-                row[self.place[v]] = row.get(self.place[v], Fraction(0)) + 1
-            rows.append(row)
-        return rows
+        rows = deviation_rows(self.projection)
+        return [{self.place[j]: x for j, x in row.items() if j in self.place} for row in rows]
 
 
 def channels_of(

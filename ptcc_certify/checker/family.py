@@ -562,7 +562,7 @@ def _state(
     return zero | dict(zip(nodes, middles, strict=True)), zero | dict(zip(nodes, radii, strict=True))
 
 
-def combination(factors: Mapping[int, int], vectors: Mapping[int, dict[int, int]]) -> dict[int, int]:
+def combination(factors: Mapping[int, Any], vectors: Mapping[int, dict[int, Any]]) -> dict[int, Any]:
     """Return the sum of multiples of vectors, without zeros.
 
     Examples
@@ -570,7 +570,7 @@ def combination(factors: Mapping[int, int], vectors: Mapping[int, dict[int, int]
     >>> combination({1: 2, 2: -1}, {1: {5: 1, 6: 1}, 2: {5: 2}})
     {6: 2}
     """
-    total: dict[int, int] = {}
+    total: dict[int, Any] = {}
     for k, factor in factors.items():
         for j, x in vectors[k].items():
             total[j] = total.get(j, 0) + factor * x

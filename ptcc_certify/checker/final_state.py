@@ -167,14 +167,25 @@ class FinalState:
     @cached_property
     def deviations(self) -> tuple[Matrix, int, Matrix]:
         """``D = I - Q`` on the columns ``free_nodes``, times a scale; the scale; ``D'D``."""
-        place, Q = {v: j for j, v in enumerate(self.structure.free_nodes)}, self.projection
-        rows = [[(i == v) - row.get(v, Fraction(0)) for v in place] for i, row in enumerate(Q)]
-        D, scale = integers(rows)
+        rows, zero = deviation_rows(self.projection), Fraction(0)
+        D, scale = integers([[row.get(v, zero) for v in self.structure.free_nodes] for row in rows])
         columns, bits = list(zip(*D, strict=True)), longest(x for row in D for x in row)
         sized(len(columns) ** 2 + len(D) * len(columns), 2 * bits, "D'D")
         spend(len(columns) ** 2 * len(D) // 2, bits, bits, "D'D")
         half = [[sum(map(mul, x, y)) for y in columns[: i + 1]] for i, x in enumerate(columns)]
         return D, scale, [[half[max(i, j)][min(i, j)] for j in range(len(half))] for i in range(len(half))]
+
+
+def deviation_rows(projection: Sequence[Mapping[int, Fraction]]) -> list[dict[int, Fraction]]:
+    """Return the rows of ``I - Q`` from those of ``Q``.
+
+    Examples
+    --------
+    >>> deviation_rows([{}, {0: Fraction(1, 2)}])
+    [{0: Fraction(1, 1)}, {0: Fraction(-1, 2), 1: Fraction(1, 1)}]
+    """
+    zero = Fraction(0)
+    return [{j: (i == j) - row.get(j, zero) for j in sorted({i, *row})} for i, row in enumerate(projection)]
 
 
 @dataclass(frozen=True, kw_only=True)

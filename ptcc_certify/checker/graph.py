@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Annotated, Any, Literal, TypeAlias
 
+from lmi.exact.numbers import shorten
 from lmi.exact.work import keeps
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.reading import entries, exact, fields, need
 from ptcc_certify.checker.section_declarations import Column, Labels, Node, Pattern, Several, Sha256, Unread, read
-from ptcc_certify.checker.side_files import beside
+from ptcc_certify.checker.side_files import Numbers, beside
 
 #: From this number of edges on NumPy is used, where it is there.
 MANY_EDGES = 10_000
@@ -115,3 +116,10 @@ def ordered(labels: Sequence[str], entry: Any, what: str) -> dict[str, Any]:
     """Return an object that has these labels as keys, in this order."""
     need(list(fields(entry, labels, what)) == labels, "agents are in another order")
     return entry
+
+
+def proved_above(graph: Digraph, values: Numbers, what: str, least: Sequence[Fraction]) -> Numbers:
+    """Return bounds by agent, none of which is below what is proved."""
+    low = next((label for label, x, y in zip(graph.labels, values, least, strict=True) if x < y), None)
+    need(low is None, f"{what} of agent {shorten(low or '')} is not proved")
+    return values

@@ -15,7 +15,8 @@ from lmi.exact.work import spend
 from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.document import Document
-from ptcc_certify.checker.final_state import FinalState
+from ptcc_certify.checker.final_state import FinalState, deviation_rows
+from ptcc_certify.checker.graph import proved_above
 from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.checker.matrix_products import (
     Matrix,
@@ -201,13 +202,6 @@ def check_input(doc: Document, verified: Verified) -> None:
                 verify(doc, verified, section, bounds)
     except (ValueError, OverflowError) as error:
         raise RejectedError(str(error)) from None
-
-
-def proved_above(graph: Digraph, values: Numbers, what: str, least: Sequence[Fraction]) -> Numbers:
-    """Return bounds by agent, none of which is below what is proved."""
-    low = next((label for label, x, y in zip(graph.labels, values, least, strict=True) if x < y), None)
-    need(low is None, f"{what} of agent {shorten(low or '')} is not proved")
-    return values
 
 
 # ---------------------------------------------------------------------- bounded or not
@@ -454,7 +448,7 @@ def _roots(
 
 def _largest_deviation(final: FinalState, initial_set: formulas.InitialSet) -> Fraction:
     """Return ``sup max_k |x_k(0) - (Q x(0))_k|``, which no deviation exceeds where the input is not held."""
-    rows = [{j: (i == j) - row.get(j, Fraction(0)) for j in {i, *row}} for i, row in enumerate(final.projection)]
+    rows = deviation_rows(final.projection)
     bits = length(x for row in rows for x in row.values()) + length(initial_set.center)
     spend(5 * sum(map(len, rows)) * (2 + len(initial_set.axes)), bits, bits, "deviations of all initial states")
     return max(map(initial_set.largest, rows))

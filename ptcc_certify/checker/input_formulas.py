@@ -300,6 +300,90 @@ class Limits:
         return gain.clock(low, q) + top * (end - turn), gain.square(high, q) + top**2 * (end - turn)
 
 
+def clock_between(gain: PrescribedGain, cap: Fraction | None, a: Fraction, b: Fraction) -> Fraction | None:
+    """Bound ``int_a^b min(gain, cap) dt`` from below for ``0 <= a < b <= T``; None where it is infinite.
+
+    Examples
+    --------
+    >>> gain = PrescribedGain(Fraction(1), Fraction(1), Fraction(2))
+    >>> float(clock_between(gain, None, Fraction(0), Fraction(1, 2)))  # 1/2 + 2 ln 2
+    1.8862943611198906
+    >>> one, half = Fraction(1), Fraction(1, 2)
+    >>> clock_between(gain, Fraction(5), half, one), clock_between(gain, None, 0 * one, one)
+    (Fraction(5, 2), None)
+    """
+    turn = gain.T
+    if cap is not None:
+        turn = max(gain.T - gain.k / (cap - gain.rho1), Fraction(0)) if cap > gain.rho1 else Fraction(0)
+    elif b == gain.T:
+        return None
+    early, late = min(b, turn), max(a, turn)
+    way = Fraction(0) if cap is None or late >= b else cap * (b - late)
+    if a < early:
+        way += gain.rho1 * (early - a) + gain.k * log((gain.T - a) / (gain.T - early), BITS)[0]
+    return rounded(max(way, Fraction(0)), BITS)
+
+
+def gain_above(gain: PrescribedGain, gain_cap: Fraction, b: Fraction, cap: Fraction | None = None) -> Fraction:
+    """Bound ``sup_t g e^(-b s_c)``, ``g = min(gain, gain_cap)``, ``s_c`` the integral of ``min(g, cap)`` from 0 to t.
+
+    While ``gain`` grows past neither cap, or past ``cap`` alone, the product falls, grows, or first falls and then
+    grows; under ``gain_cap`` it falls: the supremum is where ``t = 0``, or where the gain comes to a cap.
+
+    Examples
+    --------
+    >>> gain = PrescribedGain(Fraction(1), Fraction(1), Fraction(2))
+    >>> gain_above(gain, Fraction(9), Fraction(1)), gain_above(gain, Fraction(2), Fraction(1))
+    (Fraction(3, 1), Fraction(2, 1))
+    >>> 9 * 0.6 < gain_above(gain, Fraction(9), Fraction(1, 8)) < 9 * 0.7
+    True
+    """
+    first, lower = gain.value(Fraction(1)), gain_cap if cap is None else min(cap, gain_cap)
+    found = [min(first, gain_cap)]
+    for level in (lower, gain_cap):
+        if level > first:
+            t = gain.T - gain.k / (level - gain.rho1)
+            found.append(level * decay_above(b * (clock_between(gain, lower, Fraction(0), t) or Fraction(0))))
+    return max(found)
+
+
+def drift_above(gain: PrescribedGain, b: Fraction, cap: Fraction | None) -> Fraction:
+    """Bound ``int_0^T e^(-b (s_c(T) - s_c(r))) dr`` from above, ``s_c`` the integral of ``min(gain, cap)``.
+
+    Before ``gain`` comes to the cap, where ``T - t = r``, it is ``int (r/(T - x))^p dx`` at most, ``p = b k``; from
+    there on a linear equation with constant coefficients adds ``(1 - e^(-b cap r)) / (b cap)``. By so much, over the
+    least entry of the vector of the rows, leaders of speed 1 drive followers off; by nothing without a cap, as the
+    clock goes on for ever.
+
+    Examples
+    --------
+    >>> gain = PrescribedGain(Fraction(1), Fraction(1), Fraction(2))
+    >>> float(drift_above(gain, Fraction(1), Fraction(2)))  # (1 - e^-2)/2
+    0.43233235838169365
+    >>> 0.09 < drift_above(gain, Fraction(1), Fraction(11)) < 0.11, drift_above(gain, Fraction(1), None)
+    (True, Fraction(0, 1))
+    """
+    if cap is None:
+        return Fraction(0)
+    turn = gain.T if cap <= gain.value(Fraction(1)) else gain.k / (cap - gain.rho1)
+    low, high = _decay_within(b * cap * turn)
+    return rounded(high * _left_before(gain, b * gain.k, turn) + (1 - low) / (b * cap), BITS, up=True)
+
+
+def _left_before(gain: PrescribedGain, p: Fraction, left: Fraction) -> Fraction:
+    """Bound ``int_0^(T - left) (left/(T - x))^p dx = left (1 - e^(-(p-1) z)) / (p - 1)``, ``z = ln(T/left)``."""
+    z = rounded(log(gain.T / left, BITS)[1], BITS, up=True)
+    if p < 1:
+        grown = exp(rounded((1 - p) * z, BITS, up=True), BITS)[1]
+        return left * min((grown - 1) / (1 - p), z * grown)
+    return left * (z if p == 1 else min(z, (1 - _decay_within((p - 1) * z)[0]) / (p - 1)))
+
+
+def _decay_within(x: Fraction) -> Interval:
+    """Enclose ``e^-x``, ``x >= 0``."""
+    return exp(-rounded(x, BITS, up=True), BITS)[0], exp(-rounded(x, BITS), BITS)[1]
+
+
 def sampled_above(gain: PrescribedGain, limits: Limits, rate: Fraction, growth: Fraction) -> Fraction:
     """Bound ``V`` at the end over ``V(0)`` if gain and input are held over periods.
 

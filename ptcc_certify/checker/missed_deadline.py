@@ -13,7 +13,7 @@ from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph, edges_of
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.input_formulas import BITS
-from ptcc_certify.checker.messages_asked import Messages
+from ptcc_certify.checker.message_ages import Messages
 from ptcc_certify.checker.protocol import Begin
 from ptcc_certify.checker.reading import length, need
 from ptcc_certify.checker.section_declarations import FollowerIntegers, Node, Positive

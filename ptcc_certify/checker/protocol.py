@@ -13,6 +13,7 @@ from lmi.exact.numbers import shorten
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.document import Document
+from ptcc_certify.checker.graph import proved_above
 from ptcc_certify.checker.input_formulas import PrescribedGain, Reaching
 from ptcc_certify.checker.reading import RejectedError, need
 from ptcc_certify.checker.section_declarations import ByAgent, FewAgents, NotNegative, Positive
@@ -181,6 +182,5 @@ def check_sliding_part(
         least = sliding_part(protocol.gains, begin.sigma or Numbers([]))
         if least is None:
             raise RejectedError("the sliding part is not bounded")
-        low = next((label for label, x, y in zip(graph.labels, section.agents, least, strict=True) if x < y), None)
-        need(low is None, f"the sliding part of agent {shorten(low or '')} is not proved")
+        proved_above(graph, section.agents, "the sliding part", least)
         doc.done("for every disturbance within delta")

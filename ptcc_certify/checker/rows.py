@@ -25,7 +25,7 @@ from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import Edge, Family
 from ptcc_certify.checker.input_formulas import BITS
-from ptcc_certify.checker.messages_asked import PARTS
+from ptcc_certify.checker.message_ages import PARTS
 from ptcc_certify.checker.protocol import Begin
 from ptcc_certify.checker.reading import need
 from ptcc_certify.checker.side_files import Numbers
@@ -240,11 +240,14 @@ class Followers(RowSystem):
         low = next((k for k, (u, x) in enumerate(zip(values, away, strict=True)) if p * u < q * x), None)
         need(low is None, f"agent {self.label(low or 0)} starts farther from its final state")
 
-    def never_grows(self, values: Sequence[int], value_error: Fraction, push: Fraction = Fraction(0)) -> None:
-        """Verify ``sum_l |w_kl| (y_k - y_l - value_error) >= push``; all over one scale."""
-        scale = math.lcm(value_error.denominator, push.denominator)
-        heard, own = (self.whole(_times(scale, values, less)) for less in (0, int(value_error * scale)))
-        self.need_rows(own, heard, [int(push * scale)] * len(values), "the start of agent {} may grow")
+    def need_outweighed(
+        self, values: Sequence[int], factor: Fraction, error: Fraction, push: Fraction, why: str
+    ) -> None:
+        """Verify ``sum_l |w_kl| (factor (y_k - y_l) - error) >= push``, ``y_l = 0`` of others; all over one scale."""
+        scale = math.lcm(factor.denominator, error.denominator, push.denominator)
+        times, lost, least = (int(x * scale) for x in (factor, error, push))
+        heard, own = (self.whole(_times(times, values, less)) for less in (0, lost))
+        self.need_rows(own, heard, [least] * len(values), why)
 
 
 class Rows:
@@ -285,18 +288,13 @@ class Rows:
     def above_floor(self, floor: Fraction, value_error: Fraction) -> None:
         """Verify ``sum_l |w_kl| (floor (u_k - u_l) - value_error) >= 0``."""
         need(floor >= 0, "floor is negative")
-        times = floor.numerator * value_error.denominator
-        error = floor.denominator * value_error.numerator * self.scale
-        heard, own = (self.followers.whole(_times(times, self.u, less)) for less in (0, error))
         why = "what is heard wrong drives agent {} farther"
-        self.followers.need_rows(own, heard, [0] * len(self.u), why)
+        self.followers.need_outweighed(self.u, floor, value_error * self.scale, Fraction(0), why)
 
     def above_push(self, floor: Fraction, push: Fraction) -> None:
         """Verify ``floor sum_l |w_kl| (u_k - u_l) >= push``."""
         need(floor >= 0, "what pushes followers is negative")
-        least = [floor.denominator * push.numerator * self.scale] * len(self.u)
-        times = floor.numerator * push.denominator
-        self.followers.need_rows(self.whole, self.whole, least, "agent {} is pushed farther", times)
+        self.followers.need_outweighed(self.u, floor, Fraction(0), push * self.scale, "agent {} is pushed farther")
 
     @cached_property
     def largest(self) -> tuple[list[int], int]:

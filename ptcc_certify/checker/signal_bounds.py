@@ -5,7 +5,7 @@ With ``V <= e^(-r s) V(0)`` and ``|(L X)_k| <= c_k sqrt(V)`` for every member, f
     |u_k| <= gain c_k sqrt(V(0)) e^(-r s / 2),      |x_k(t) - x_k(T)| <= (2/r) c_k sqrt(V(0)) e^(-r s / 2)
 
 and ``r rho2 kappa >= 2`` makes the first largest at ``t = 0``. Where agents end by the common kernel is in
-:mod:`~ptcc_certify.checker.family_ends`.
+:mod:`~ptcc_certify.checker.common_kernel_ends`.
 
 Sliding variables that are not 0 at first drive the agents besides. ``y = x - sigma`` obeys ``y' = -gain L (y +
 sigma)``, and ``|sigma_k| <= psi |sigma_k(0)|``, which no graph enters: then all this is said of ``y``. With ``sqrt(V)``
@@ -29,11 +29,10 @@ from lmi.exact.decimal_rounding import up
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import spend
+from ptcc_certify.checker.common_forms import Scaled
+from ptcc_certify.checker.common_kernel_ends import WeightedMean, check_means, limits
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import STABILITY, Component, Family
-from ptcc_certify.checker.family_ends import WeightedMean, check_means, limits
-from ptcc_certify.checker.family_function import Scaled
-from ptcc_certify.checker.family_rows import Function as VerifiedFunction
 from ptcc_certify.checker.input_formulas import BITS, decay_above, root_above, stretches
 from ptcc_certify.checker.protocol import (
     Begin,
@@ -47,6 +46,7 @@ from ptcc_certify.checker.protocol import (
 )
 from ptcc_certify.checker.protocol import Protocol as Parameters
 from ptcc_certify.checker.reading import Interval, RejectedError, length, need
+from ptcc_certify.checker.row_functions import Function as VerifiedFunction
 from ptcc_certify.checker.section_declarations import FewAgents
 
 Sizes = Mapping[int, Fraction]
@@ -57,7 +57,7 @@ LEAST, MOST_DECAY = Fraction(1, 2**200), Fraction(100)
 
 
 class Function(Protocol):
-    """What a Lyapunov function says, by node: see :class:`~ptcc_certify.checker.family_function.FamilyFunction`."""
+    """What a Lyapunov function says, by node: see :class:`~ptcc_certify.checker.common_forms.FamilyFunction`."""
 
     @property
     def rate(self) -> Fraction:

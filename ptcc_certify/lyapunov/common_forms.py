@@ -17,8 +17,8 @@ import numpy as np
 from lmi.definiteness_proofs import prove_generalized_margin
 from lmi.exact import arithmetic
 from lmi.exact.numbers import integers
-from ptcc_certify.checker.family_ends import WeightedMean
-from ptcc_certify.checker.family_function import Scaled
+from ptcc_certify.checker.common_forms import Scaled
+from ptcc_certify.checker.common_kernel_ends import WeightedMean
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.lyapunov.quotient import Quotient, QuotientMode
 from ptcc_certify.theorems.matrix_arithmetic import Matrix, integer_matrix, integer_rows

@@ -31,7 +31,7 @@ import numpy as np
 
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.numbers import integers
-from ptcc_certify.checker.family_function import Scaled
+from ptcc_certify.checker.common_forms import Scaled
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.family import Family

@@ -21,7 +21,7 @@ import numpy as np
 from lmi.definiteness_proofs import prove_positive_definite
 from lmi.dyadic import round_to_bits
 from lmi.exact.decimal_rounding import float_down
-from ptcc_certify.checker.rates import InertiaWitness, MeanWitness
+from ptcc_certify.checker.lyapunov import InertiaWitness, MeanWitness
 from ptcc_certify.graphs.rationals import writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure

@@ -34,10 +34,10 @@ from lmi.exact.numbers import integers
 from lmi.search_time import checkpoint
 from lmi.sparse_definiteness_proofs import prove_sparse_positive_definite
 from lmi.sparse_h_matrix import FILL_ROWS, fill_core, solve
+from ptcc_certify.checker.common_forms import Scaled
 from ptcc_certify.checker.family import Edge
-from ptcc_certify.checker.family_function import Scaled
-from ptcc_certify.checker.family_squares import WeightedSquares
 from ptcc_certify.checker.input_formulas import root_above
+from ptcc_certify.checker.weighted_squares import WeightedSquares
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.lyapunov.dominance import round_array

@@ -30,9 +30,7 @@ from ptcc_certify.bounds.delay.staged_deadlines import levels
 from ptcc_certify.bounds.final_state.of_graph import final_state
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.certification import certify
-from ptcc_certify.checker.drift_by_leaders import drift_above
-from ptcc_certify.checker.input_formulas import PrescribedGain
-from ptcc_certify.checker.late_input import gain_above
+from ptcc_certify.checker.input_formulas import PrescribedGain, drift_above, gain_above
 from ptcc_certify.errors import HypothesisError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure, analyse

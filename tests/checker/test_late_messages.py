@@ -23,9 +23,9 @@ from lmi.exact.work import WorkError, limited
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker import check, graph
 from ptcc_certify.checker.array_digraph import ArrayDigraph
-from ptcc_certify.checker.array_late_steps import ArraySteps
+from ptcc_certify.checker.array_stepwise_bounds import ArraySteps
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.late_steps import Steps, decay_above
+from ptcc_certify.checker.stepwise_bounds import Steps, fixed_decay_above
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
@@ -145,7 +145,7 @@ def test_what_follows_is_accepted_with_and_without_arrays_and_has_the_shape_of_t
     data = samples()[name]
     VALIDATOR.validate(data)
     monkeypatch.setattr(graph, "MANY_EDGES", 0)
-    monkeypatch.setattr("ptcc_certify.checker.late_messages.MANY_EDGES", 0)
+    monkeypatch.setattr("ptcc_certify.checker.messages.MANY_EDGES", 0)
     reports = [check(data), check(data, stdlib=True)]
     for report in reports:
         assert report.accepted, (report.rejected, report.reason)
@@ -488,7 +488,7 @@ def test_decays_of_arrays_are_those_of_integers_at_every_size():
     rng = np.random.default_rng(3)
     near = [(1 << b) + d for b in range(2, 62) for d in (-1, 0, 1)]
     x = np.array([*range(99), *near, *(int(v) for b in range(5, 62) for v in rng.integers(0, 1 << b, 50))])
-    assert ArraySteps._decay(x).tolist() == [decay_above(v) for v in x.tolist()]
+    assert ArraySteps._decay(x).tolist() == [fixed_decay_above(v) for v in x.tolist()]
 
 
 # ---------------------------------------------------------------------- a missed deadline, and deadlines of their own

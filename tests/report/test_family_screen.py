@@ -323,7 +323,7 @@ def test_a_family_without_a_name_is_told_by_its_size():
 
 def test_more_functions_than_the_check_takes_are_left_out_and_nothing_rests_on_them(monkeypatch: pytest.MonkeyPatch):
     pairs = [(s, t, 1, high) for k in range(3) for s, t, high in ((f"a{k}", f"b{k}", 2), (f"b{k}", f"a{k}", 1))]
-    monkeypatch.setattr("ptcc_certify.checker.family_rows.MANY_FUNCTIONS", 2)
+    monkeypatch.setattr("ptcc_certify.checker.row_functions.MANY_FUNCTIONS", 2)
     refused = certify_family(Family.from_intervals(pairs), PROTOCOL, range(6), time_limit=60)
     told = "\n".join(summary_lines(refused, "pairs")).replace("\n           ", " ")
     assert refused.verdict == "undecided" and "more than 2 Lyapunov functions" in (refused.checked.reason or "")

@@ -12,10 +12,9 @@ import numpy as np
 
 from lmi.exact.elementary_enclosures import rounded
 from ptcc_certify.bounds.final_state.of_graph import Influence
-from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above
-from ptcc_certify.checker.late_input import gain_above
+from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above, gain_above
 from ptcc_certify.checker.lyapunov_form import Form
-from ptcc_certify.checker.messages_asked import PARTS, Messages, Moving
+from ptcc_certify.checker.message_ages import PARTS, Messages, Moving
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family

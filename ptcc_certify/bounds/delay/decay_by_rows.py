@@ -32,8 +32,7 @@ from lmi.errors import LMIError, NoCertificate
 from lmi.exact.decimal_rounding import float_up
 from lmi.exact.elementary_enclosures import log, rounded
 from ptcc_certify.bounds.delay.case import LateCase
-from ptcc_certify.checker.drift_by_leaders import drift_above
-from ptcc_certify.checker.input_formulas import BITS
+from ptcc_certify.checker.input_formulas import BITS, drift_above
 from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
 from ptcc_certify.model.gain import Gain
 

@@ -32,13 +32,12 @@ from ptcc_certify.bounds.envelope import instants_from_0
 from ptcc_certify.bounds.float_conversion import floats, floats_up
 from ptcc_certify.bounds.virtual_positions import VehicleBounds, bound_vehicles, read_vehicles, vehicles_section
 from ptcc_certify.checker.delay_lmi import LateLMIWitness
-from ptcc_certify.checker.late_form import LateFormWitness
-from ptcc_certify.checker.late_messages import MessagesSection, StepsStart
-from ptcc_certify.checker.messages_asked import Delays, Packets
+from ptcc_certify.checker.delayed_forms import LateFormWitness, SettlingWitness
+from ptcc_certify.checker.message_ages import Delays, Packets
+from ptcc_certify.checker.messages import MessagesSection, StepsStart
 from ptcc_certify.checker.missed_deadline import Signs
 from ptcc_certify.checker.obligations import CheckReport
 from ptcc_certify.checker.section_declarations import RowVector, declared
-from ptcc_certify.checker.settling_leaders import SettlingWitness
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, pairs_of

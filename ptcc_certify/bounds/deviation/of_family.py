@@ -15,7 +15,7 @@ import numpy as np
 
 from ptcc_certify.bounds.envelope import Instants
 from ptcc_certify.bounds.reaching_phase import ReachingPhase
-from ptcc_certify.checker.family_function import Scaled
+from ptcc_certify.checker.common_forms import Scaled
 from ptcc_certify.checker.signal_bounds import Drive, deviations, least
 from ptcc_certify.checker.signal_bounds import Function as BoundsFunction
 from ptcc_certify.graphs.rationals import nearest_float

@@ -17,8 +17,8 @@ from lmi.exact.numbers import integers
 from ptcc_certify.bounds.deviation.of_family import deviation_on_clock
 from ptcc_certify.certificate.constrained_switching.claims import RateClaim
 from ptcc_certify.certificate.family_proof import ComponentProof, FamilyProof
-from ptcc_certify.checker.family_ends import WeightedMean
-from ptcc_certify.checker.family_function import Scaled
+from ptcc_certify.checker.common_forms import Scaled
+from ptcc_certify.checker.common_kernel_ends import WeightedMean
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.lyapunov.common_forms import CommonForm
 from ptcc_certify.lyapunov.mode_forms import mode_functions

@@ -20,6 +20,8 @@ from ptcc_certify.certificate.constrained_switching.claims import (
     WindowClaim,
 )
 from ptcc_certify.certificate.functions import Proved, rates_of
+from ptcc_certify.checker.common_forms import Multipliers
+from ptcc_certify.checker.common_kernel_ends import EQUAL
 from ptcc_certify.checker.constant_signal_ends import FinalValue, FinalValueSection
 from ptcc_certify.checker.constrained_switching import (
     Dwell,
@@ -32,8 +34,6 @@ from ptcc_certify.checker.constrained_switching import (
     Windows,
     WindowsSection,
 )
-from ptcc_certify.checker.family_ends import EQUAL
-from ptcc_certify.checker.family_function import Multipliers
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, find_camps

@@ -16,12 +16,10 @@ from fractions import Fraction
 from itertools import pairwise
 from math import ceil
 
-from lmi.exact.elementary_enclosures import log, rounded
 from lmi.exact.numbers import longest, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.input_formulas import BITS, PrescribedGain
-from ptcc_certify.checker.messages_asked import PARTS
+from ptcc_certify.checker.message_ages import PARTS
 
 #: Bits of a fixed-point number, of the share of a degree in the largest one, and of the way of the clock.
 FIXED, SHARE, WAY = 30, 40, 42
@@ -30,35 +28,12 @@ ONE = 1 << FIXED
 LONGEST_WAY = 31
 
 
-def clock_below(gain: PrescribedGain, cap: Fraction | None, a: Fraction, b: Fraction) -> Fraction | None:
-    """Bound ``int_a^b min(gain, cap) dt`` from below for ``0 <= a < b <= T``; None where it is infinite.
-
-    Examples
-    --------
-    >>> gain = PrescribedGain(Fraction(1), Fraction(1), Fraction(2))
-    >>> float(clock_below(gain, None, Fraction(0), Fraction(1, 2)))  # 1/2 + 2 ln 2
-    1.8862943611198906
-    >>> clock_below(gain, Fraction(5), Fraction(1, 2), Fraction(1)), clock_below(gain, None, Fraction(0), Fraction(1))
-    (Fraction(5, 2), None)
-    """
-    turn = gain.T
-    if cap is not None:
-        turn = max(gain.T - gain.k / (cap - gain.rho1), Fraction(0)) if cap > gain.rho1 else Fraction(0)
-    elif b == gain.T:
-        return None
-    early, late = min(b, turn), max(a, turn)
-    way = Fraction(0) if cap is None or late >= b else cap * (b - late)
-    if a < early:
-        way += gain.rho1 * (early - a) + gain.k * log((gain.T - a) / (gain.T - early), BITS)[0]
-    return rounded(max(way, Fraction(0)), BITS)
-
-
-def decay_above(x: int) -> int:
+def fixed_decay_above(x: int) -> int:
     """Bound ``e^-x`` from above by ``1/(1 + x + x^2/2 + x^3/6 + x^4/24)``; both are multiples of ``2^-30``.
 
     Examples
     --------
-    >>> decay_above(ONE) / ONE  # 24/65
+    >>> fixed_decay_above(ONE) / ONE  # 24/65
     0.3692307695746422
     """
     total = ONE
@@ -174,7 +149,7 @@ class Steps:
             return array("q", map(min, y, heard))
         known: dict[int, int] = {}
         for share in set(self.shares):
-            known[share] = decay_above(share * way[0] >> way[1])
+            known[share] = fixed_decay_above(share * way[0] >> way[1])
         rest = (
             h + -(-max(x - h, 0) * known[share] >> FIXED) for x, h, share in zip(y, heard, self.shares, strict=True)
         )

@@ -7,29 +7,25 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
 
-from lmi.exact.decimal_rounding import down, up
+from lmi.exact.decimal_rounding import down
 from lmi.exact.work import spend
 from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.delay_lmi import LateLMI, check_delay_lmi
+from ptcc_certify.checker.delayed_forms import LateForm, SettlingSection, check_form, check_settling
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.document import Document
-from ptcc_certify.checker.drift_by_leaders import drift_above
 from ptcc_certify.checker.family import Family
 from ptcc_certify.checker.graph import MANY_EDGES
 from ptcc_certify.checker.input import Verified
-from ptcc_certify.checker.late_form import LateForm, check_form
-from ptcc_certify.checker.late_input import Inputs
-from ptcc_certify.checker.late_steps import FIXED, Steps, clock_below
-from ptcc_certify.checker.messages_asked import Delays, Messages, Moving, check_delays, need_left
+from ptcc_certify.checker.input_formulas import clock_between, drift_above
+from ptcc_certify.checker.message_ages import Delays, Messages, Moving, check_delays, need_left
 from ptcc_certify.checker.missed_deadline import MissedDeadline, check_missed, check_staged
 from ptcc_certify.checker.protocol import Begin, Protocol
 from ptcc_certify.checker.reading import length, need
 from ptcc_certify.checker.rows import Followers, Rows, followers_of
 from ptcc_certify.checker.section_declarations import Agents, ByFollower, FollowerNumbers, Positive, Several
-from ptcc_certify.checker.settling_leaders import SettlingSection, check_settling
-from ptcc_certify.checker.side_files import Numbers
-from ptcc_certify.checker.stated_bounds import Decay, Stated
-from ptcc_certify.checker.virtual_positions import Vehicles, VehiclesSection
+from ptcc_certify.checker.stated_bounds import Decay, Inputs, Residual, Stated, Vehicles, VehiclesSection
+from ptcc_certify.checker.stepwise_bounds import FIXED, Steps
 
 #: Witnesses of rows, and instants of steps, that are read.
 MANY_ROWS, MANY_INSTANTS = 100, 2001
@@ -79,33 +75,6 @@ class MessagesSection(Delays):
     lmi: LateLMI | None
     input: Agents | None
     vehicles: VehiclesSection | None = None
-
-
-class Residual:
-    """What is stated of ``|x_k(T) - x*_k|`` of followers; leaders rest.
-
-    Parameters
-    ----------
-    doc : Document
-    values : Numbers
-        By agent.
-    """
-
-    def __init__(self, doc: Document, followers: Followers, values: Numbers):
-        doc.at = "messages.residual"
-        self.stated = Stated("residual", followers.labels, values)
-        self.stated.rest(followers.others, "a residual of a leader that rests")
-
-    def by_rows(self, rows: Rows, decay: Decay) -> None:
-        """Mark what is at least as large as this decay leaves it."""
-        at_T = decay.initial * decay.left + decay.floor + decay.drift
-        self.stated.meet(rows.followers.nodes, (at_T / rows.scale, rows.u))
-
-    def close(self, doc: Document) -> None:
-        """Verify that a bound meets what is stated of every follower."""
-        doc.open("late-residual", "messages.residual")
-        self.stated.close()
-        doc.done(f"at most {up(self.stated.largest)}")
 
 
 def check_messages(doc: Document, of: Verified | Family, protocol: Protocol, begin: Begin) -> None:
@@ -232,11 +201,11 @@ def _check_steps(
     gains = [limits.gain_at(gain, t) for t in instants[:-1]] if messages.leaders is not None else []
     push = messages.leaders.push * scale / gains[0] if messages.leaders is not None else Fraction(0)
     followers.starts_within(values, scale)
-    followers.never_grows(values, error, push)
-    ways = [clock_below(gain, messages.gain_cap, a, b) for a, b in pairwise(instants)]
+    followers.need_outweighed(values, Fraction(1), error, push, "the start of agent {} may grow")
+    ways = [clock_between(gain, messages.gain_cap, a, b) for a, b in pairwise(instants)]
     kind, degrees = Steps, [graph.diagonal[v] for v in followers.nodes]
     if doc.exact.numpy and graph.n_edges >= MANY_EDGES:
-        from ptcc_certify.checker.array_late_steps import ArraySteps as kind  # noqa: N813
+        from ptcc_certify.checker.array_stepwise_bounds import ArraySteps as kind  # noqa: N813
     steps = kind(graph, followers.nodes, degrees, values, error, messages.parts, push)
     bounds = steps.run(instants, messages.delay, ways, gains)
     residual.meet(followers.nodes, (Fraction(steps.largest, scale << FIXED), bounds))

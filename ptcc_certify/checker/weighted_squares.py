@@ -19,11 +19,11 @@ from typing import Literal
 from lmi.exact.decimal_rounding import down
 from lmi.exact.numbers import common_denominator, integers, longest, sized
 from lmi.exact.work import fits, spend
+from ptcc_certify.checker.common_forms import Scaled
+from ptcc_certify.checker.common_kernel_ends import WeightedMean
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.dominance import LARGEST_FORM, FactorSection, read_factor
 from ptcc_certify.checker.family import STABILITY, Component, Edge, Family
-from ptcc_certify.checker.family_ends import WeightedMean
-from ptcc_certify.checker.family_function import Scaled
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.checker.reading import need
 from ptcc_certify.checker.section_declarations import Vector

@@ -22,15 +22,15 @@ from lmi.exact.decimal_rounding import down
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import spend
+from ptcc_certify.checker.common_forms import FamilyFunction, FormSection, Scaled, check_form
+from ptcc_certify.checker.common_kernel_ends import WeightedMean
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import Component, Family, Part
-from ptcc_certify.checker.family_ends import WeightedMean
-from ptcc_certify.checker.family_function import FamilyFunction, FormSection, Scaled, check_form
-from ptcc_certify.checker.family_squares import SquaresFunction, SquaresSection, check_squares
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.reading import need
 from ptcc_certify.checker.rows import RowSystem, WeightsBetween
 from ptcc_certify.checker.section_declarations import Nodes, NotNegative, Positive, Several, Vector
+from ptcc_certify.checker.weighted_squares import SquaresFunction, SquaresSection, check_squares
 
 #: Lyapunov functions that are read.
 MANY_FUNCTIONS = 1000

@@ -2,7 +2,7 @@
 
 Products of fixed-point numbers are below ``2^62``: weights of one row sum to ``2^30`` and a unit for each, entries are
 at most ``2^30``; long factors are split in two. Nothing is rounded in any other way than by
-:class:`~ptcc_certify.checker.late_steps.Steps`, with which tests compare it.
+:class:`~ptcc_certify.checker.stepwise_bounds.Steps`, with which tests compare it.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ptcc_certify.checker.late_steps import FIXED, ONE, Steps
+from ptcc_certify.checker.stepwise_bounds import FIXED, ONE, Steps
 
 #: From ``2^FARTHEST`` units on a decay is rounded up to one unit; half of the bits of a share and of a fixed-point one.
 FARTHEST, HALF_SHARE, HALF = 39, 20, 15

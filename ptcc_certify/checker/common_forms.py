@@ -7,7 +7,7 @@ make of them at rest; in every mode ``xi' = -gain A xi`` with ``A = A_0 + sum_e 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -17,10 +17,10 @@ from lmi.exact.decimal_rounding import down
 from lmi.exact.definite import Arithmetic
 from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import spend
+from ptcc_certify.checker.common_kernel_ends import WeightedMean
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import Component, Edge, Family, combination
-from ptcc_certify.checker.family_ends import WeightedMean
 from ptcc_certify.checker.graph import ordered, positions
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.checker.matrix_products import (
@@ -157,19 +157,12 @@ def check_form(doc: Document, family: Family, component: Component, entry: FormS
     nodes = positions(doc, graph, entry.nodes, "nodes of a function")
     pivots = set(component.pivots.values())
     need(nodes == [v for v in component.nodes if v not in pivots] and bool(nodes), "nodes of a function")
-    need_rows(len(nodes))
-    need(len(entry.lower_triangle) == len(nodes), f"lower_triangle has not {len(nodes)} entries")
-    (P, scale), rate = integers(entry.lower_triangle), entry.rate
-    need(doc.exact.definite(P), "P is not proved definite")
-    rates = []
-    modes = []
-    for k in range(len(family.modes)):
-        numbers = doc.open("family-rate", f"{of}.modes[{k}]")
-        modes.append(quotient_of(family, k, component, nodes))
-        decreases(doc.exact, modes[k], (P, scale), component.whole[1], numbers["b"], numbers["witness"])
-        rates.append(numbers["b"])
-        doc.done(f"b = {down(numbers['b'])}")
-    need(min(rates) == rate, "the rate is not the least of the modes'")
+    proved = []
+    for one in rates_of_modes(doc, family, component, nodes, [entry.lower_triangle], of):
+        proved.append(one)
+        doc.done(f"b = {down(one[2])}")
+    ((P, scale), *_), modes, rates = zip(*proved, strict=True)
+    need(min(rates) == entry.rate, "the rate is not the least of the modes'")
     doc.open("family-constants", of)
     labels = family.labels
     labels_of = {v: labels[v] for v in component.nodes}
@@ -180,7 +173,31 @@ def check_form(doc: Document, family: Family, component: Component, entry: FormS
     need(len(means) <= MANY_MEANS, f"more than {MANY_MEANS} means")
     _constants(doc.exact, modes, (P, scale), inputs, coordinates, means)
     doc.done(f"{len(inputs)} inputs, {len(coordinates)} coordinates" + (f", {len(means)} means" if means else ""))
-    return FamilyFunction(component, nodes, P, scale, rate, inputs, coordinates, means)
+    return FamilyFunction(component, nodes, P, scale, entry.rate, inputs, coordinates, means)
+
+
+def rates_of_modes(
+    doc: Document,
+    family: Family,
+    component: Component,
+    nodes: list[int],
+    triangles: Sequence[Sequence[Sequence[Fraction]]],
+    of: str,
+) -> Iterator[tuple[tuple[Matrix, int], QuotientMode, Fraction]]:
+    """Yield the form of every mode in integers and over what, the mode in its coordinates, and its verified rate.
+
+    There is one form for all modes, or one for each. Who takes them closes the obligations.
+    """
+    need_rows(len(nodes))
+    form: tuple[Matrix, int] = [], 1
+    for k in range(len(family.modes)):
+        if k < len(triangles):
+            need(len(triangles[k]) == len(nodes), f"lower_triangle has not {len(nodes)} entries")
+            form = integers(triangles[k])
+            need(doc.exact.definite(form[0]), "P is not proved definite")
+        numbers, mode = doc.open("family-rate", f"{of}.modes[{k}]"), quotient_of(family, k, component, nodes)
+        decreases(doc.exact, mode, form, component.whole[1], numbers["b"], numbers["witness"])
+        yield form, mode, numbers["b"]
 
 
 def _mean(doc: Document, graph: Digraph, component: Component, entry: MeanSection) -> WeightedMean:
