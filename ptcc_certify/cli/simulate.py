@@ -196,7 +196,7 @@ def _run_agents(graph: str, signed: SignedDigraph, protocol: Protocol, options: 
     agents, initial = agents_and_states(options, signed, certified=exchanges_virtual(options))
     begin = replace(initial or InitialState(), sigma0=shared.sigma0_of(protocol, options, signed))
     case = Case(signed, protocol, begin, agents=agents, asks=asks, **beside)
-    return run_of_agents(case, options["samples"], pattern=options["age_pattern"], seed=options["seed"])
+    return run_of_agents(case, options["samples"], pattern=(options["age_pattern"], options["seed"]))
 
 
 def _refuse_messages(options: shared.Options, what: str) -> None:
