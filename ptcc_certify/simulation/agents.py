@@ -224,7 +224,7 @@ def simulate_agents(
     z = np.zeros((len(q), *begin.shape))
     if np.abs(begin).max(initial=0):
         limited = GainLimits(gain_cap=protocol.gain_cap).limit(protocol.gain)
-        z = sample(_Deviations(graph, begin, block, protocol, rate, rtol), limited, instants)
+        z, _ = sample(_Deviations(graph, begin, block, protocol, rate, rtol), limited, instants)
     scaled = np.moveaxis(np.einsum("km,imc->ikc", U, z).reshape(len(q), N, d, n), 0, -1)
     free = np.einsum("mij,kdj->kdim", _free_motion(protocol, q), common.reshape(N, d, n))
     eta = np.array([protocol.value(x) for x in q])

@@ -130,9 +130,9 @@ def simulate_late(
         raise ParameterError("deadlines", f"= {shorten(repr(deadlines))} are none; give one for each agent")
     if deadlines is not None and len(deadlines) != graph.n_nodes:
         raise ParameterError(f"deadlines are {len(deadlines)} for {graph.n_nodes} agents; give one for each")
-    first, ages = [float(x) for x in as_state(x0, graph, "x0")], _ages(graph, messages)
-    at_once = _heard_at_once(graph, messages, ages)
-    t = _instants(float(protocol.T), messages, ages, steps, STEP_SHARE / 5 if at_once.size else STEP_SHARE)
+    first = [float(x) for x in as_state(x0, graph, "x0")]
+    hearing = _Hearing(graph, messages, float(protocol.T), word, np.random.default_rng(random))
+    t = hearing.instants(steps)
     if t.size * graph.n_nodes > MOST_STATES:
         raise ParameterError(
             f"{t.size:,} instants of {graph.n_nodes:,} agents are more than {MOST_STATES:,} states; "
@@ -144,7 +144,6 @@ def simulate_late(
     clocks = run.clock[:, None] if deadlines is None else _own_clocks(run, deadlines)
     with np.errstate(invalid="ignore"):
         steps_of_clock = np.where(np.isinf(clocks[1:]), np.inf, clocks[1:] - clocks[:-1])
-    hearing = _Hearing(run, messages, ages, at_once, word, np.random.default_rng(random))
     states, errors = np.empty((2, t.size, graph.n_nodes))
     states[0] = first
     D, leading = graph.in_weight(), _Leading(graph, messages)
@@ -180,35 +179,6 @@ def can_run(protocol: Protocol, messages: LateMessages) -> bool:
     messages : LateMessages
     """
     return not messages.age or MOST_STEPS * messages.age >= protocol.T * IN_DELAY
-
-
-def _ages(graph: SignedDigraph, messages: LateMessages) -> np.ndarray:
-    """Return how old is what is heard over every edge, at most."""
-    latencies = messages.latencies(graph)
-    each = latencies if isinstance(latencies, tuple) else (latencies,)
-    return np.broadcast_to([float(x + messages.held) for x in each], graph.n_edges)
-
-
-def _heard_at_once(graph: SignedDigraph, messages: LateMessages, ages: np.ndarray) -> np.ndarray:
-    """Return the edges over which followers hear at once."""
-    if messages.held or messages.own_delay:
-        return np.arange(0)
-    return np.flatnonzero(np.isin(graph.target, analyse(graph).followers) & (ages == 0))
-
-
-def _instants(T: float, messages: LateMessages, ages: np.ndarray, steps: int, share: float) -> np.ndarray:
-    """Return instants that come near to ``T``: some in the largest delay, one in the least unless that is too short.
-
-    Steps are at most such a share of what is left until ``T``.
-    """
-    age = float(messages.age)
-    least = float(ages[ages > 0].min(initial=age))
-    longest = min(T / steps, age / IN_DELAY, max(least, T / _MOST_FOR_LEAST)) if age else T / steps
-    if T / longest > MOST_STEPS:
-        raise ParameterError(
-            f"a delay of {age:.3g} in a run of {T:.6g} takes more than {MOST_STEPS:,} steps; the bound needs no run"
-        )
-    return T - steps_towards(T, longest, share, NEAREST)
 
 
 def _own_clocks(run: Setup, deadlines: Sequence[Fraction]) -> np.ndarray:
@@ -279,23 +249,37 @@ class _Hearing:
     """What agents hear over a step: sums over edges of values that are held."""
 
     def __init__(
-        self,
-        run: Setup,
-        messages: LateMessages,
-        ages: np.ndarray,
-        at_once: np.ndarray,
-        pattern: str,
-        random: np.random.Generator,
+        self, graph: SignedDigraph, messages: LateMessages, T: float, pattern: str, random: np.random.Generator
     ):
-        graph, t = run.graph, run.instants.t
         self.source, self.target, self.weights, self.n = graph.source, graph.target, graph.weights, graph.n_nodes
-        self.ages, self.at_once, self.t, self.pattern, self.random = ages, at_once, t, pattern, random
+        latencies = messages.latencies(graph)
+        each = latencies if isinstance(latencies, tuple) else (latencies,)
+        self.ages = np.broadcast_to([float(x + messages.held) for x in each], graph.n_edges)
+        self.T, self.age, self.pattern, self.random = T, float(messages.age), pattern, random
         self.error, self.own = float(messages.value_error), messages.own_delay
-        self.speed = random.uniform(2, 40, graph.n_edges) / t[-1]
+        self.speed = random.uniform(2, 40, graph.n_edges) / T
         self.phase = random.uniform(0, 2 * np.pi, graph.n_edges)
         self.old = random.random(graph.n_edges) < 0.5
         self.signs = np.where(random.random(graph.n_edges) < 0.5, 1.0, -1.0)
+        followers = np.isin(self.target, analyse(graph).followers)
+        self.at_once = np.flatnonzero(followers & (self.ages == 0) & (not self.own))
         self.degree = graph.in_weight()
+
+    def instants(self, steps: int) -> np.ndarray:
+        """Return instants that come near to ``T``: some in the largest delay, one in the least that is not too short.
+
+        A step is a share of what is left until ``T`` at most, a fifth of that where followers hear at once.
+        """
+        T, age = self.T, self.age
+        least = float(self.ages[self.ages > 0].min(initial=age))
+        longest = min(T / steps, age / IN_DELAY, max(least, T / _MOST_FOR_LEAST)) if age else T / steps
+        if T / longest > MOST_STEPS:
+            raise ParameterError(
+                f"a delay of {age:.3g} in a run of {T:.6g} takes more than {MOST_STEPS:,} steps; the bound needs no run"
+            )
+        share = STEP_SHARE / 5 if self.at_once.size else STEP_SHARE
+        self.t = T - steps_towards(T, longest, share, NEAREST)
+        return self.t
 
     def correct(self, before: np.ndarray, after: np.ndarray, step: np.ndarray, left: np.ndarray) -> None:
         """Let what followers hear at once change evenly over a step of the clock, in place of being held.

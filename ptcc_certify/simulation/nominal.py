@@ -7,11 +7,10 @@ course is on the stretched clock again.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -64,24 +63,30 @@ class Bounded:
     bound: int | float | str | Fraction
 
 
-class Part(NamedTuple):
-    """A part of a run that is on one phase: which instants are in it, their ``z``, and the ``z`` where it ends."""
+def sample(
+    motion: Motion, limited: LimitedGain, instants: Instants, course: Course | None = None, goal: float = 0.0
+) -> tuple[np.ndarray, float | None]:
+    """Return the (M, N, S) states of a motion under a gain, and the residual at ``T`` if it has its pole there.
 
-    phase: Phase
-    here: np.ndarray
-    z: np.ndarray
-    end: float
-
-
-def parts(limited: LimitedGain, instants: Instants) -> Iterator[Part]:
-    """Yield the parts of a run under a gain that is not held over periods, as far as its instants go."""
-    t, remaining, _ = instants
+    Parameters
+    ----------
+    motion : Motion
+    limited : LimitedGain
+        The gain that acts, not held over periods.
+    instants : Instants
+        Where the gain has its pole, ``T`` is among them only with a course.
+    course : Course, optional
+        Of the motion; from ``1 - t/T = e^-40`` on to a pole it goes on upon the stretched clock, where nothing drives.
+    goal : float
+        Of the residual.
+    """
+    (t, remaining, _), states, residual = instants, np.empty((instants.t.size, *motion.state.shape)), None
     T, rho1, pole = (float(value) for value in (limited.gain.T, limited.gain.rho1, limited.gain.pole))
     for stretch in limited.stretches:
         here = (remaining <= stretch.begin) & (remaining > stretch.end)
         beyond = bool((remaining <= stretch.end).any())
         if not here.any() and not beyond:
-            return
+            break
         if stretch.level is None:
             phase, z = Phase(0.0, T, rho1, pole), limited.tau(stretch, t, remaining)[here]
             end = -math.log(stretch.end) if stretch.end else max(_LAST_TAU, float(z.max(initial=0.0)))
@@ -89,45 +94,17 @@ def parts(limited: LimitedGain, instants: Instants) -> Iterator[Part]:
             span = T * (stretch.begin - stretch.end) if stretch.end >= 0 else T
             phase = Phase(T * (1 - stretch.begin), span, stretch.level, past=True)
             z, end = limited.elapsed(stretch, t, remaining)[here] / span, 1.0 if stretch.end >= 0 else math.inf
-        yield Part(phase, here, z, end if beyond else min(float(z[-1]), end))
-
-
-def sample(motion: Motion, limited: LimitedGain, instants: Instants) -> np.ndarray:
-    """Return the (M, N, S) states of a motion under a gain, which is integrated up to the last instant."""
-    states = np.empty((instants.t.size, *motion.state.shape))
-    for part in parts(limited, instants):
-        states[part.here] = motion.sample(part.phase, part.z, part.end)
-    return states
-
-
-def forced(course: Course, limited: LimitedGain, instants: Instants, goal: float) -> tuple[np.ndarray, float | None]:
-    """Return the (M, N, S) states of a driven motion under a gain, and the residual at ``T`` if it has its pole there.
-
-    Parameters
-    ----------
-    course : Course
-        Of one graph.
-    limited : LimitedGain
-        The gain that acts, not held over periods.
-    instants : Instants
-    goal : float
-        Of the residual.
-    """
-    if limited.bounded or instants.remaining[-1] > math.exp(-_LAST_TAU):
-        return sample(course.motion, limited, instants), None
-    motion, residual = course.motion, None
-    states = np.empty((instants.t.size, *motion.state.shape))
-    for part in parts(limited, instants):
-        driven = part.end if part.phase.past else _LAST_TAU
-        states[part.here] = motion.sample(part.phase, part.z, driven)
-        if part.phase.past:
+        last = end if beyond else min(float(z[-1]), end)
+        if course is None or phase.past or stretch.end or last < _LAST_TAU:
+            states[here] = motion.sample(phase, z, last)
             continue
+        states[here] = motion.sample(phase, z, _LAST_TAU)
         with motion.at_rest():
-            course.clock = float(limited.gain.clock_at_tau(driven))
-            free, clock = part.z > driven, limited.gain.clock_at_tau(part.z)
+            course.clock = float(limited.gain.clock_at_tau(_LAST_TAU))
+            free, clock = z > _LAST_TAU, limited.gain.clock_at_tau(z)
             if free.any():
-                states[np.flatnonzero(part.here)[free]] = course.sample(clock[free], float(clock[-1]))
-            residual = course.settle(goal) if instants.remaining[-1] == 0 else None
+                states[np.flatnonzero(here)[free]] = course.sample(clock[free], float(clock[-1]))
+            residual = course.settle(goal) if beyond else None
     return states, residual
 
 

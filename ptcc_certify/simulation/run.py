@@ -36,7 +36,7 @@ from ptcc_certify.simulation.interrupt import interruptible
 from ptcc_certify.simulation.late_messages import simulate_late
 from ptcc_certify.simulation.member_laplacians import Choice, Members
 from ptcc_certify.simulation.moving_leaders import simulate_tracking
-from ptcc_certify.simulation.nominal import Bounded, as_forcing, forced, sample_and_hold
+from ptcc_certify.simulation.nominal import Bounded, as_forcing, sample, sample_and_hold
 from ptcc_certify.simulation.sliding import SlidingMotion, rounding_slack
 from ptcc_certify.simulation.switched_motion import Course
 from ptcc_certify.simulation.switching_signals import ConstantSignal, Signal, as_signal
@@ -257,7 +257,7 @@ class _Run(Setup):
         elif forcing is None:
             states, residual = self.on_the_clock(course, self.clock)
         else:
-            states, residual = forced(course, self.gain, self.instants, self.goal)
+            states, residual = sample(motion, self.gain, self.instants, course, self.goal)
         late = np.flatnonzero(remaining == 0)
         if residual is None and self.protocol.prescribed and late.size:
             residual = motion.members.imbalance(states[late[0]], Choice(0) if self.family is None else None)
@@ -316,38 +316,6 @@ class _Run(Setup):
             acted = tuple(course.choices), np.array(course.switches), np.array(course.acting, dtype=np.int64)
             played = Played(self.family, self.signal.text, *acted)
         return self.trajectory(states, self.tolerances, residual, course.motion.stats, played=played, **more)
-
-
-def simulate_formation(graph: Any, protocol: Protocol, x0: Any, offsets: Any, **options: Any) -> Trajectory:
-    """Run single integrators in a formation: less their places they move as they do without.
-
-    Parameters
-    ----------
-    graph, protocol, x0, **options
-        As for :func:`simulate`; ``x0`` is where agents begin.
-    offsets : state-like
-        Their places.
-
-    Returns
-    -------
-    Trajectory
-        Its ``positions`` are where agents are, its ``states`` less their places.
-
-    Examples
-    --------
-    >>> from ptcc_certify.simulation.run import simulate_formation
-    >>> team = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
-    >>> run = simulate_formation(team, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], [0, 5], times=[0, 1])
-    >>> run.positions.round(9)
-    array([[ 3. , -0.5],
-           [ 1. ,  4.5]])
-    """
-    graph = as_graph(graph)
-    rows, places = as_states(x0, graph, "x0"), as_states(offsets, graph, "offsets")
-    if len(rows[0]) != len(places[0]):
-        raise ParameterError("offsets", f"has {len(places[0])} numbers for each agent, x0 has {len(rows[0])}")
-    less = [[x - h for x, h in zip(*pair, strict=True)] for pair in zip(rows, places, strict=True)]
-    return simulate(graph, protocol, less, **options).in_places(_floats(places, graph, "offsets"))
 
 
 def _with_defaults(given: Mapping[str, Any]) -> dict[str, Any]:

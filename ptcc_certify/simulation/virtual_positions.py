@@ -109,7 +109,8 @@ def simulate_vehicles(
     instants = instants_left(protocol.gain, remaining, samples, protocol.gain_cap)
     g = _gain_kept(limited, instants.t, instants.remaining)
     first = np.array([x0, np.asarray(v0, dtype=float) / g[0], x0], dtype=float).T
-    x, w, z = np.moveaxis(sample(_Tracking(graph, first, protocol, rtol), limited, instants), 0, -1).swapaxes(0, 1)
+    states, _ = sample(_Tracking(graph, first, protocol, rtol), limited, instants)
+    x, w, z = states.transpose(2, 1, 0)
     a1, a2 = float(protocol.a1), float(protocol.a2)
     theta = _slope(protocol, g) / g**2
     e = -(graph.laplacian() @ z)
