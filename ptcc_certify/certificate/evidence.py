@@ -13,6 +13,7 @@ from ptcc_certify.bounds.agents.run_against_bounds import AgentsComparison
 from ptcc_certify.bounds.envelope import Comparison, remaining_part
 from ptcc_certify.bounds.final_state.labelled_ends import FinalEnds
 from ptcc_certify.bounds.final_state.of_graph import FinalState, final_state
+from ptcc_certify.certificate.asked_run import late_run
 from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.certificate.proof import OfQuestion
@@ -23,7 +24,6 @@ from ptcc_certify.lyapunov.search import Search
 from ptcc_certify.model.disturbance import ExpressionDisturbance
 from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.simulation.agents import AgentsTrajectory
-from ptcc_certify.simulation.late_messages import can_run, simulate_late
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import Trajectory
 
@@ -295,25 +295,9 @@ class Evidence(OfQuestion, Shown):
         if isinstance(proof, FamilyProof) or proof.initial_state is None:
             return None
         try:
-            late, start = proof.late, [float(x) for x in proof.initial_state]
-            if late is not None and late.tracks:
-                from ptcc_certify.simulation.moving_leaders import simulate_tracking  # it loads SciPy
-
-                u, cap = (late.rows[0].witness.u if late.rows else None), late.messages.gain_cap
-                assert late.leaders is not None
-                run: Trajectory = simulate_tracking(proof.graph, proof.protocol, late.leaders, start, u=u, gain_cap=cap)
-                return self._in_places(run)
-            if late is not None and not can_run(proof.protocol, late.messages):
-                return None
-            if late is not None and late.tracking_protocol is not None:
-                from ptcc_certify.simulation.virtual_positions import follow, run_virtual_positions
-
-                assert late.messages.vehicles is not None
-                virtual = run_virtual_positions(proof.graph, proof.protocol, late.messages, start, late.leaders)
-                return follow(virtual, late.tracking_protocol, late.messages.vehicles.v0)
-            if late is not None:
-                run = simulate_late(proof.graph, proof.protocol, late.messages, start, leaders=late.leaders)
-                return self._in_places(run)
+            if proof.late is not None:
+                run = late_run(proof, proof.late)
+                return run if run is None or run.vehicles else self._in_places(run)
             if len(proof.limits) != 1 or not proof.direct:
                 return None
             (limits,) = proof.limits

@@ -129,12 +129,15 @@ def places_of(options: Options, graph: SignedDigraph, protocol: Protocol) -> Seq
 def run_in_places(
     graph: SignedDigraph, protocol: Protocol, x0: Any, places: Sequence[Fraction] | None, **options: Any
 ) -> Trajectory:
-    """Run single integrators, in a formation if they have places."""
-    from ptcc_certify.simulation.run import simulate, simulate_formation
+    """Run single integrators; in a formation, if they have places: less these they move as they do without."""
+    import numpy as np
+
+    from ptcc_certify.simulation.run import simulate
 
     if places is None:
         return simulate(graph, protocol, x0, **options)
-    return simulate_formation(graph, protocol, x0, places, **options)
+    less = [x - h for x, h in zip(x0, places, strict=True)]
+    return simulate(graph, protocol, less, **options).in_places(np.array([float(h) for h in places]))
 
 
 def _in_places(agents: Agents, options: Options, graph: SignedDigraph, dimension: int) -> Agents:

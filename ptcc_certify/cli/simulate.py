@@ -174,7 +174,7 @@ def _run_agents(graph: str, signed: SignedDigraph, protocol: Protocol, options: 
     agents, initial = of_agents.agents_and_states(options, signed, certified=of_agents.exchanges_virtual(options))
     begin = replace(initial or InitialState(), sigma0=shared.sigma0_of(protocol, options, signed))
     case = Case(signed, protocol, begin, agents=agents, asks=asks, **beside)
-    return of_agents.run_of_agents(case, options["samples"], pattern=options["age_pattern"], seed=options["seed"])
+    return of_agents.run_of_agents(case, options["samples"], pattern=(options["age_pattern"], options["seed"]))
 
 
 def _refuse_messages(options: shared.Options, what: str) -> None:
@@ -195,7 +195,7 @@ def _run_beside(
         leaders = MovingLeaders(speed=0, disturbance=options["delta"])
     source = click.get_current_context().get_parameter_source
     name = "late messages" if messages else "leaders that move"
-    refused = ["steps", "boundary_layer", "noise", "stop_before", "sample_period"]
+    refused = ["steps", "boundary_layer", "stop_before", "sample_period"]
     if protocol.reaching is None:
         refused += ["delta", "disturbance"] if leaders is None else ["disturbance"]
     given = [option for option in refused if options[option] is not None]
@@ -205,6 +205,10 @@ def _run_beside(
     if given:
         raise ParameterError(f"{flag_of(given[0])}: is not simulated with {name}; leave it out")
     families.refuse_restricted(options)
+    if options["noise"] is not None:  # what is heard is off by it
+        asks, limits = Asks(noise=options["noise"]), shared.limits_of(options)
+        case = Case(signed, protocol, messages=messages, leaders=leaders, limits=limits, asks=asks).with_rows()
+        messages, leaders = case.messages, case.leaders
     sigma0 = shared.sigma0_of(protocol, options, signed)
     x0 = shared.read_initial_state(options["x0"], options["seed"], signed)
     more: Any = {"messages": messages, "leaders": leaders}

@@ -20,8 +20,11 @@ import numpy as np
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.rationals import shorten, whole_number
 from ptcc_certify.model.agents_protocol import AgentsProtocol
+from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.simulation.cvodes import Motion, Phase, Tolerances
+from ptcc_certify.simulation.instants import Instants
 from ptcc_certify.simulation.member_laplacians import Members
+from ptcc_certify.simulation.nominal import sample
 from ptcc_certify.simulation.trajectory import ByAgent, csv_text
 
 if TYPE_CHECKING:
@@ -120,36 +123,20 @@ class AgentsTrajectory(ByAgent):
 
 
 class AgentsMotion(Motion):
-    """Numbers of every agent up to a cap of the gain, and from there on.
+    """Numbers of every agent, with a tolerance of the size of the largest.
 
     Parameters
     ----------
     graph : SignedDigraph
     state : (N, S) array
-    gain : Gain
-        Without the cap.
-    cap : Fraction or None
     rtol : float
         Of CVODES.
     """
 
-    def __init__(self, graph: SignedDigraph, state: np.ndarray, gain: Gain, cap: Fraction | None, rtol: float):
+    def __init__(self, graph: SignedDigraph, state: np.ndarray, rtol: float):
         largest = max(float(np.abs(state).max(initial=0)), 1e-300)
         super().__init__(Members(graph), state, Tolerances(rtol, rtol * largest))
-        self._gain, self._cap = gain, cap
         self._options |= {"max_num_steps": 200_000}
-
-    def run(self, q: np.ndarray, turn: float) -> np.ndarray:
-        """Return (M, N, S) states where ``1 - t/T`` is ``q``; from ``turn`` on the gain is capped."""
-        states, early, T = np.zeros((q.size, *self.state.shape)), q >= turn, float(self._gain.T)
-        states[early] = self.state
-        if turn < 1:
-            phase = Phase(0.0, T, float(self._gain.rho1), float(self._gain.pole))
-            states[early] = self.sample(phase, -np.log(q[early]), -math.log(max(turn, float(q[-1]))))
-        if turn and not early.all():
-            phase = Phase(T * (1 - turn), T * turn, float(self._cap or 0), past=True)
-            states[~early] = self.sample(phase, 1 - q[~early] / turn, 1.0)
-        return states
 
 
 class _Deviations(AgentsMotion):
@@ -158,7 +145,7 @@ class _Deviations(AgentsMotion):
     def __init__(
         self, graph: SignedDigraph, state: np.ndarray, block: np.ndarray, of: AgentsProtocol, rate: float, rtol: float
     ):
-        super().__init__(graph, state, of.gain, of.gain_cap, rtol)
+        super().__init__(graph, state, rtol)
         self._block, self._of, self._rate = block, of, rate
         for key in ("newton_scheme", "use_preconditioner", "max_krylov"):
             self._options.pop(key, None)
@@ -167,11 +154,11 @@ class _Deviations(AgentsMotion):
         """Return the slope of the deviations on the clock of the phase."""
         import casadi as ca
 
-        n, k = self._of.order, float(self._gain.pole)
+        n = self._of.order
         R = phase.rate(z, ca.exp)
         g = phase.nominal(R)
         zeta = R / g
-        theta = ca.MX(0) if phase.past else (1 - float(self._gain.rho1) * zeta) ** 2 / k
+        theta = phase.shrinking(R)
         A = ca.MX(ca.DM(np.eye(n, k=1) + self._rate / 2 * np.eye(n))) - theta * ca.DM(np.diag(np.arange(float(n))))
         plant, own = (list(map(float, numbers)) for numbers in (self._of.plant, self._of.own))
         last = ca.hcat([-own[i] - plant[i] * zeta ** (n - i) for i in range(n)])
@@ -223,7 +210,8 @@ def simulate_agents(
     N, d, n = xi.shape
     if N * d * n > MOST_STATES:
         raise SimulationError(f"more than {MOST_STATES} numbers to integrate; simulate fewer agents")
-    q = shares_left(remaining, samples, protocol.gain_cap)
+    instants = instants_left(protocol.gain, remaining, samples, protocol.gain_cap)
+    t, q, _ = instants
     h = np.array([[float(x) for x in row] for row in protocol.offsets])
     xi[:, :, 0] -= h
     U, kernel, block = _split(graph)
@@ -235,7 +223,8 @@ def simulate_agents(
     begin = coordinates[: U.shape[1]] * scale
     z = np.zeros((len(q), *begin.shape))
     if np.abs(begin).max(initial=0):
-        z = _Deviations(graph, begin, block, protocol, rate, rtol).run(q, protocol.capped_from)
+        limited = GainLimits(gain_cap=protocol.gain_cap).limit(protocol.gain)
+        z, _ = sample(_Deviations(graph, begin, block, protocol, rate, rtol), limited, instants)
     scaled = np.moveaxis(np.einsum("km,imc->ikc", U, z).reshape(len(q), N, d, n), 0, -1)
     free = np.einsum("mij,kdj->kdim", _free_motion(protocol, q), common.reshape(N, d, n))
     eta = np.array([protocol.value(x) for x in q])
@@ -245,7 +234,6 @@ def simulate_agents(
     control = _input(graph, protocol, scaled * np.exp(-rate * clock / 2), free, eta)
     all_states[:, :, 0] += h[:, :, None]
     control += float(protocol.plant[0]) * h[:, :, None]
-    t = float(protocol.gain.T) * (1 - q)
     run = AgentsTrajectory(graph, protocol, t, q, clock, all_states, scaled, control, rtol, rate)
     if protocol.gain_cap is not None:
         return run
@@ -253,11 +241,12 @@ def simulate_agents(
     return _with_deadline(run, common.reshape(N, d, n), h, protocol.agree_if_above(slowest))
 
 
-def shares_left(remaining: float, samples: int, cap: Fraction | None) -> np.ndarray:
-    """Return instants as ``1 - t/T``: so many uniform in ``tau``, as many in ``t``; with ``T`` itself under a cap."""
+def instants_left(gain: Gain, remaining: float, samples: int, cap: Fraction | None) -> Instants:
+    """Return instants: so many uniform in ``tau``, as many in ``t``; with ``T`` itself under a cap."""
     samples = whole_number(samples, "samples", 2, 100_000)
     q = np.unique(np.concatenate([np.geomspace(remaining, 1, samples), np.linspace(remaining, 1, samples)]))[::-1]
-    return q if cap is None else np.append(q, 0.0)
+    q = q if cap is None else np.append(q, 0.0)
+    return Instants(float(gain.T) * (1 - q), q, np.zeros(q.size))
 
 
 def _split(graph: SignedDigraph) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

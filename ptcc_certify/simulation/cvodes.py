@@ -93,6 +93,10 @@ class Phase:
         """Return the nominal gain times ``R``."""
         return self.rho1 * R + (self.pole * R / (self.gap + R) if self.pole else 0)
 
+    def shrinking(self, R: Any) -> Any:
+        """Return minus the derivative of 1 over the nominal gain: ``(1 - rho1/gain)^2/pole`` towards its pole."""
+        return (1 - self.rho1 * R / self.nominal(R)) ** 2 / self.pole if self.pole else 0.0
+
     def stiffness(self, in_weight: float) -> float:
         """Bound the rates, per unit of ``z``, of agents that listen with ``in_weight`` at most."""
         return (self.rho1 * self.span + self.pole) * in_weight + self.mu2 * self.span + self.reaching_pole

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 #: How far a run goes past the deadline unless told otherwise, as a share of it.
 PAST = 0.25
 _PAST_SAMPLES = 5
+#: Steps of a run in steps of closed form at most; a step as a share of what is left until ``T``, at most.
+MOST_STEPS, STEP_SHARE = 20_000, 0.02
 # 1 - t/T at 0.5 T, 0.9 T, 0.99 T.
 _MARKS = (0.5, 0.1, 0.01)
 
@@ -35,6 +37,17 @@ class Instants(NamedTuple):
     def z(self) -> np.ndarray:
         """``ln(T_r/(T_r - t))``, infinite from ``T_r`` on."""
         return minus_log(self.reaching_remaining, 1 - self.reaching_remaining)
+
+
+def steps_towards(T: float, longest: float, share: float, nearest: float) -> np.ndarray:
+    """Return what is left until ``T`` after steps at most so long, each at most a share of what is left, from 0 on.
+
+    The last but one instant is as near to ``T`` as ``nearest`` times ``T``.
+    """
+    left = [0.0, nearest * T]
+    while left[-1] < T:
+        left.append(left[-1] + min(longest, left[-1] * share))
+    return np.array([*left[:-1], T])[::-1]
 
 
 def default_instants(protocol: Protocol, remaining: float, samples: int, past: float) -> Instants:
@@ -71,17 +84,6 @@ def default_instants(protocol: Protocol, remaining: float, samples: int, past: f
     table = table[:, np.lexsort((table[0], -table[1], -table[2]))]
     fresh = np.append(True, np.diff(table, axis=1).any(axis=0))
     return Instants(*table[:, fresh])
-
-
-def steps_towards(T: float, longest: float, share: float, nearest: float) -> np.ndarray:
-    """Return what is left until ``T`` after steps at most so long, each at most a share of what is left, from 0 on.
-
-    The last but one instant is as near to ``T`` as ``nearest`` times ``T``.
-    """
-    left = [0.0, nearest * T]
-    while left[-1] < T:
-        left.append(left[-1] + min(longest, left[-1] * share))
-    return np.array([*left[:-1], T])[::-1]
 
 
 def wanted_instants(protocol: Protocol, times: Iterable[Exact]) -> Instants:

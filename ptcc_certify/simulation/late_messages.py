@@ -14,9 +14,7 @@ constant times the gain within a step, at most ``d``.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
-from dataclasses import replace
 from fractions import Fraction
 from typing import Any, Literal
 
@@ -35,18 +33,16 @@ from ptcc_certify.model.limited_gain import LimitedGain
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.refusals import refuse_together
 from ptcc_certify.simulation.cvodes import Tolerances
-from ptcc_certify.simulation.instants import steps_towards
-from ptcc_certify.simulation.member_laplacians import Choice, Members
-from ptcc_certify.simulation.trajectory import Conditions, Trajectory
+from ptcc_certify.simulation.instants import MOST_STEPS, STEP_SHARE, Instants, steps_towards
+from ptcc_certify.simulation.moving_leaders import WorstLeaders
+from ptcc_certify.simulation.trajectory import Conditions, Setup, Trajectory
 
 Pattern = Literal["oldest", "fresh", "varying", "square"]
 PATTERNS = ("oldest", "fresh", "varying", "square")
 #: Corrections of what is heard at once, in a step, at most.
 _CORRECTIONS = 100
-#: Instants of a run, and at most; the share of ``T`` down to which they come nearer to it.
-STEPS, MOST_STEPS, NEAREST = 1500, 20_000, 1e-9
-#: A step as a share of what is left until ``T``, at most; a fifth of that where followers hear at once.
-_SHARE = 0.02
+#: Instants of a run, about; the share of ``T`` down to which they come nearer to it.
+STEPS, NEAREST = 1500, 1e-9
 #: How many times leaders in groups fall by a factor e until they are settled.
 _SETTLED = 40
 #: Terms of the exponential series of a matrix whose 1-norm is 1 at most; what is left out is below ``2^-53``.
@@ -66,8 +62,7 @@ def simulate_late(
     messages: LateMessages,
     x0: Any,
     *,
-    pattern: Pattern = "oldest",
-    seed: int = 0,
+    pattern: Pattern | tuple[Pattern, int] = "oldest",
     steps: int = STEPS,
     deadlines: Sequence[Fraction] | None = None,
     leaders: MovingLeaders | None = None,
@@ -84,11 +79,9 @@ def simulate_late(
         where its own delay is less than that, but not 0.
     x0 : state-like
         The state up to 0, whatever :func:`ptcc_certify.as_state` takes.
-    pattern : {"oldest", "fresh", "varying", "square"}
+    pattern : {"oldest", "fresh", "varying", "square"}, or one with a seed
         As old as allowed; as fresh as allowed, but for the step; between the two like a sine of its own for every edge;
-        from the one to the other and back at random instants.
-    seed : int
-        Of what is random.
+        from the one to the other and back at random instants. With a seed of what is random: ``("varying", 3)``.
     steps : int
         Instants, about.
     deadlines : sequence of N Fraction, optional
@@ -123,35 +116,38 @@ def simulate_late(
     >>> run.states[:, -1].round(3)
     array([1.   , 1.   , 0.996])
     """
-    if pattern not in PATTERNS:
-        raise ParameterError(f'pattern "{shorten(str(pattern))}" is unknown; one of {", ".join(PATTERNS)}')
+    word, seed = pattern if isinstance(pattern, tuple) and len(pattern) == 2 else (pattern, 0)
+    if word not in PATTERNS:
+        raise ParameterError(f'pattern "{shorten(str(word))}" is unknown; one of {", ".join(PATTERNS)}')
     refuse_no_protocol(protocol)
     if not isinstance(messages, LateMessages):
         raise ParameterError("messages", f"= {shorten(repr(messages))} is none; give LateMessages(delay='0.01'), say")
     if leaders is not None and not isinstance(leaders, MovingLeaders):
         raise ParameterError("leaders", f"= {shorten(repr(leaders))} is none; give MovingLeaders(speed=1), say")
     graph = as_graph(graph)
-    steps, seed = whole_number(steps, "steps", 2, MOST_STEPS), whole_number(seed, "seed", 0, 2**63)
+    steps, random = whole_number(steps, "steps", 2, MOST_STEPS), whole_number(seed, "seed", 0, 2**63)
     if deadlines is not None and not isinstance(deadlines, Sequence):
         raise ParameterError("deadlines", f"= {shorten(repr(deadlines))} are none; give one for each agent")
     if deadlines is not None and len(deadlines) != graph.n_nodes:
         raise ParameterError(f"deadlines are {len(deadlines)} for {graph.n_nodes} agents; give one for each")
     first = [float(x) for x in as_state(x0, graph, "x0")]
-    share = _SHARE / 5 if _heard_at_once(graph, messages).size else _SHARE
-    t = _grid(float(protocol.T), float(messages.age), _least_age(graph, messages), steps, share)
+    hearing = _Hearing(graph, messages, float(protocol.T), word, np.random.default_rng(random))
+    t = hearing.instants(steps)
     if t.size * graph.n_nodes > MOST_STATES:
         raise ParameterError(
             f"{t.size:,} instants of {graph.n_nodes:,} agents are more than {MOST_STATES:,} states; "
             "the bound needs no run"
         )
-    begin, clocks = time.perf_counter(), _clocks(graph, protocol, messages, t, deadlines)
+    limits = GainLimits(gain_cap=messages.gain_cap)
+    conditions = Conditions(None if limits.ideal else limits, messages=messages, leaders=leaders)
+    run = Setup(graph, protocol, Instants(t, np.maximum(1 - t / t[-1], 0), np.zeros(t.size)), conditions)
+    clocks = run.clock[:, None] if deadlines is None else _own_clocks(run, deadlines)
     with np.errstate(invalid="ignore"):
         steps_of_clock = np.where(np.isinf(clocks[1:]), np.inf, clocks[1:] - clocks[:-1])
-    hearing = _Hearing(graph, messages, t, pattern, np.random.default_rng(seed))
     states, errors = np.empty((2, t.size, graph.n_nodes))
     states[0] = first
     D, leading = graph.in_weight(), _Leading(graph, messages)
-    fleeing = None if leaders is None else _Fleeing(graph, protocol, messages, leaders, t)
+    fleeing = None if leaders is None else _Fleeing(run, messages, leaders)
     for i in range(t.size - 1):
         heard, own = hearing.sums(i, states)
         step, errors[i] = steps_of_clock[i], heard - (own if messages.own_delay else D * states[i])
@@ -167,43 +163,11 @@ def simulate_late(
         leading.move(states[i], states[i + 1], step)
         hearing.correct(states[i], states[i + 1], step, left)
     errors[-1] = heard - (own if messages.own_delay else D * states[-1])
-    limits = GainLimits(gain_cap=messages.gain_cap)
-    inputs = limits.limit(protocol.gain).value(t, np.maximum(1 - t / t[-1], 0)) * errors.T
-    conditions = Conditions(None if limits.ideal else limits, messages=messages, leaders=leaders)
+    inputs, targets = run.gains * errors.T, None
     if fleeing is not None:
         inputs[fleeing.worst.heads] = fleeing.inputs.T
-    seconds = time.perf_counter() - begin
-    run = stepped_run(graph, protocol, t, states.T, inputs, conditions, _ROUNDING, seconds)
-    return run if fleeing is None else replace(run, targets=fleeing.worst.targets(run.states))
-
-
-def stepped_run(
-    graph: SignedDigraph,
-    protocol: Protocol,
-    t: np.ndarray,
-    states: np.ndarray,
-    inputs: np.ndarray,
-    conditions: Conditions,
-    tolerance: float,
-    seconds: float,
-) -> Trajectory:
-    """Return what was run in steps of closed form as a trajectory, from (N, M) states and inputs."""
-    remaining = np.maximum(1 - t / float(protocol.T), 0)
-    end, gain = int(np.argmax(remaining == 0)), (conditions.actuator or GainLimits()).limit(protocol.gain)
-    size = max(float(np.abs(states[:, 0]).max()), 1e-300)
-    return Trajectory(
-        graph=graph,
-        protocol=protocol,
-        t=t,
-        remaining=remaining,
-        clock=gain.clock(t, remaining=remaining),
-        states=states,
-        tolerances=Tolerances(tolerance, tolerance),
-        deadline_residual=Members(graph).imbalance(states[:, end], Choice(0)) / size,
-        stats={"steps": t.size - 1, "rhs": t.size - 1, "seconds": seconds},
-        conditions=conditions,
-        held_input=inputs,
-    )
+        targets = fleeing.worst.targets(states.T)
+    return run.stepped(states.T, Tolerances(_ROUNDING, _ROUNDING), held_input=inputs, targets=targets)
 
 
 def can_run(protocol: Protocol, messages: LateMessages) -> bool:
@@ -217,71 +181,25 @@ def can_run(protocol: Protocol, messages: LateMessages) -> bool:
     return not messages.age or MOST_STEPS * messages.age >= protocol.T * IN_DELAY
 
 
-def _least_age(graph: SignedDigraph, messages: LateMessages) -> float:
-    """Return the least age of what is heard over an edge that is not 0; the largest one if there is none."""
-    latencies = messages.latencies(graph)
-    each = latencies if isinstance(latencies, tuple) else (latencies,)
-    return float(min((x + messages.held for x in each if x + messages.held > 0), default=messages.age))
-
-
-def _heard_at_once(graph: SignedDigraph, messages: LateMessages) -> np.ndarray:
-    """Return the edges over which followers hear at once."""
-    if messages.held or messages.own_delay:
-        return np.arange(0)
-    latencies = np.array(messages.latencies(graph), dtype=float)  # of every edge, or one of all
-    return np.flatnonzero(np.isin(graph.target, analyse(graph).followers) & (latencies == 0))
-
-
-def _grid(T: float, age: float, least: float, steps: int, share: float) -> np.ndarray:
-    """Return instants that come near to ``T``: some in the largest delay, one in the least unless that is too short.
-
-    Steps are at most such a share of what is left until ``T``.
-    """
-    longest = min(T / steps, age / IN_DELAY, max(least, T / _MOST_FOR_LEAST)) if age else T / steps
-    if T / longest > MOST_STEPS:
-        raise ParameterError(
-            f"a delay of {age:.3g} in a run of {T:.6g} takes more than {MOST_STEPS:,} steps; the bound needs no run"
-        )
-    return T - steps_towards(T, longest, share, NEAREST)
-
-
-def _clocks(
-    graph: SignedDigraph,
-    protocol: Protocol,
-    messages: LateMessages,
-    t: np.ndarray,
-    deadlines: Sequence[Fraction] | None,
-) -> np.ndarray:
-    """Return the clock at every instant, one for all agents or ``(M, N)``; infinite from a deadline on."""
-    limits = GainLimits(gain_cap=messages.gain_cap)
-    if deadlines is None:
-        return limits.limit(protocol.gain).clock(t, remaining=np.maximum(1 - t / t[-1], 0))[:, None]
-    g = protocol.gain
-    whole = np.empty((t.size, graph.n_nodes))
-    for end in set(deadlines):
-        gain = LimitedGain(Gain(end, g.rho1, g.rho2, g.kappa), limits)
-        column = gain.clock(t)
-        column[t >= float(end) * (1 - 1e-14)] = np.inf
-        whole[:, [k for k, x in enumerate(deadlines) if x == end]] = column[:, None]
-    return whole
+def _own_clocks(run: Setup, deadlines: Sequence[Fraction]) -> np.ndarray:
+    """Return the (M, N) clocks of agents with deadlines of their own, infinite from these on."""
+    g, clocks = run.protocol.gain, np.empty((run.instants.t.size, run.graph.n_nodes))
+    for k, end in enumerate(deadlines):
+        clocks[:, k] = LimitedGain(Gain(end, g.rho1, g.rho2, g.kappa), run.gain.limits).clock(run.instants.t)
+        clocks[run.instants.t >= float(end) * (1 - 1e-14), k] = np.inf
+    return clocks
 
 
 class _Fleeing:
     """Leaders that move away from the farthest follower over steps, and disturbances that push followers off."""
 
-    def __init__(
-        self, graph: SignedDigraph, protocol: Protocol, messages: LateMessages, leaders: MovingLeaders, t: np.ndarray
-    ):
-        from ptcc_certify.simulation.worst_leaders import WorstLeaders  # it loads SciPy
-
+    def __init__(self, run: Setup, messages: LateMessages, leaders: MovingLeaders):
         refuse_together(messages, leaders)
         if leaders.sign_gain is not None:
             raise ParameterError("sign_gain", "is not simulated where messages are late; leave it out")
-        self.worst, self.t = WorstLeaders(analyse(graph), protocol, leaders), t
-        gain = GainLimits(gain_cap=messages.gain_cap).limit(protocol.gain).value(t, np.maximum(1 - t / t[-1], 0))
-        gain[-1] = np.inf if messages.gain_cap is None else float(messages.gain_cap)
-        self.pull = graph.in_weight()[self.worst.followers] * gain[:, None]
-        self.inputs = np.zeros((t.size, self.worst.heads.size))
+        self.worst, self.t = WorstLeaders(analyse(run.graph), run.protocol, leaders), run.instants.t
+        self.pull = run.graph.in_weight()[self.worst.followers] * run.gains_before()[:, None]
+        self.inputs = np.zeros((run.instants.t.size, self.worst.heads.size))
 
     def move(self, i: int, states: np.ndarray, left: np.ndarray) -> None:
         """Add to the states after step ``i`` how leaders move, and what pushes followers."""
@@ -331,20 +249,37 @@ class _Hearing:
     """What agents hear over a step: sums over edges of values that are held."""
 
     def __init__(
-        self, graph: SignedDigraph, messages: LateMessages, t: np.ndarray, pattern: str, random: np.random.Generator
+        self, graph: SignedDigraph, messages: LateMessages, T: float, pattern: str, random: np.random.Generator
     ):
         self.source, self.target, self.weights, self.n = graph.source, graph.target, graph.weights, graph.n_nodes
         latencies = messages.latencies(graph)
-        each = latencies if isinstance(latencies, tuple) else (latencies,) * graph.n_edges
-        self.ages = np.array([float(x + messages.held) for x in each])
-        self.t, self.pattern, self.random = t, pattern, random
+        each = latencies if isinstance(latencies, tuple) else (latencies,)
+        self.ages = np.broadcast_to([float(x + messages.held) for x in each], graph.n_edges)
+        self.T, self.age, self.pattern, self.random = T, float(messages.age), pattern, random
         self.error, self.own = float(messages.value_error), messages.own_delay
-        self.speed = random.uniform(2, 40, graph.n_edges) / t[-1]
+        self.speed = random.uniform(2, 40, graph.n_edges) / T
         self.phase = random.uniform(0, 2 * np.pi, graph.n_edges)
         self.old = random.random(graph.n_edges) < 0.5
         self.signs = np.where(random.random(graph.n_edges) < 0.5, 1.0, -1.0)
-        self.at_once = _heard_at_once(graph, messages)
+        followers = np.isin(self.target, analyse(graph).followers)
+        self.at_once = np.flatnonzero(followers & (self.ages == 0) & (not self.own))
         self.degree = graph.in_weight()
+
+    def instants(self, steps: int) -> np.ndarray:
+        """Return instants that come near to ``T``: some in the largest delay, one in the least that is not too short.
+
+        A step is a share of what is left until ``T`` at most, a fifth of that where followers hear at once.
+        """
+        T, age = self.T, self.age
+        least = float(self.ages[self.ages > 0].min(initial=age))
+        longest = min(T / steps, age / IN_DELAY, max(least, T / _MOST_FOR_LEAST)) if age else T / steps
+        if T / longest > MOST_STEPS:
+            raise ParameterError(
+                f"a delay of {age:.3g} in a run of {T:.6g} takes more than {MOST_STEPS:,} steps; the bound needs no run"
+            )
+        share = STEP_SHARE / 5 if self.at_once.size else STEP_SHARE
+        self.t = T - steps_towards(T, longest, share, NEAREST)
+        return self.t
 
     def correct(self, before: np.ndarray, after: np.ndarray, step: np.ndarray, left: np.ndarray) -> None:
         """Let what followers hear at once change evenly over a step of the clock, in place of being held.

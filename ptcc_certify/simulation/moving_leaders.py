@@ -1,4 +1,7 @@
-"""Runs with leaders that move as badly as they may, without an ODE solver.
+"""Leaders that move as badly as they may, and disturbances that help them; runs with these, without an ODE solver.
+
+The target of the followers is ``X_F* = -L_F^-1 L_FL X_L``. Of the row ``k`` whose ``|eps_k| / u_k`` is largest, ``eps =
+X_F - X_F*``, leaders take the signs that part target and follower; every follower is pushed away from its own target.
 
 Over a step from ``s_i`` to ``s_(i+1)`` of the clock, in which the gain grows to ``g``, leaders move at ``v gain(t)/g``,
 and followers are pushed by ``d gain(t)/g``: within the limits of ``v`` and ``d``, and with a step in closed form,
@@ -11,33 +14,98 @@ So without the sign term every run is a solution, up to rounding. The sign term 
 
 from __future__ import annotations
 
-import time
-from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
 from lmi.blas_threads import one_thread
-from ptcc_certify.errors import gated
+from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.io import as_graph, as_state
 from ptcc_certify.graphs.rationals import whole_number
-from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.graphs.size_limits import EXACT_NODES
+from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.model.base import Protocol, refuse_no_protocol
 from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.limited_gain import LimitedGain
 from ptcc_certify.model.moving_leaders import MovingLeaders
-from ptcc_certify.simulation.instants import steps_towards
-from ptcc_certify.simulation.late_messages import stepped_run
-from ptcc_certify.simulation.trajectory import Conditions, Trajectory
-from ptcc_certify.simulation.worst_leaders import WorstLeaders
+from ptcc_certify.model.refusals import refuse_leader_groups
+from ptcc_certify.simulation.cvodes import Tolerances
+from ptcc_certify.simulation.instants import MOST_STEPS, STEP_SHARE, Instants, steps_towards
+from ptcc_certify.simulation.trajectory import JUST_BEFORE, Conditions, Setup, Trajectory
 
-#: Steps up to T; the share of what is left of T that a step takes; how near they come; where a run with sign term ends.
-STEPS, SHARE, NEAREST, PAST = 800, 0.02, 1e-7, 0.5
-#: Most steps of a run.
-MOST_STEPS = 20_000
+#: Steps up to T; how near they come; where a run ends.
+STEPS, NEAREST, PAST = 800, 1e-7, 0.5
 #: Iterations for a sign term at most, and what they may change of it at last, relative to its gain.
 _ITERATIONS, _CONVERGED = 1000, 1e-12
+
+
+class WorstLeaders:
+    """Single leaders, their followers, and the targets of these.
+
+    Parameters
+    ----------
+    structure : Structure
+    protocol : Protocol
+        The nominal one.
+    leaders : MovingLeaders
+    u : (F,) array, optional
+        By which distances are compared, positive; dimensionless.
+
+    Raises
+    ------
+    HypothesisError
+        A leader belongs to a group.
+    ParameterError
+        There are more than 120 agents, nobody listens, the protocol is another one, or ``u`` does not fit.
+
+    Examples
+    --------
+    >>> pair = analyse(SignedDigraph.from_edges([(1, 2, -1)]))
+    >>> worst = WorstLeaders(pair, NominalProtocol(1, 1, 1, 1), MovingLeaders(speed=3, disturbance=1))
+    >>> worst.velocities(np.array([0.5])), worst.pushes(np.array([0.5]))
+    (array([3.]), array([1.]))
+    """
+
+    def __init__(self, structure: Structure, protocol: Protocol, leaders: MovingLeaders, u: np.ndarray | None = None):
+        if not isinstance(leaders, MovingLeaders) or protocol.reaching:
+            mend = "give it, and MovingLeaders(speed=1), say"
+            raise ParameterError(f"leaders that move run under the nominal protocol; {mend}")
+        refuse_leader_groups(structure, "leaders that move as they like: a run")
+        n, F = structure.graph.n_nodes, structure.followers
+        if n > EXACT_NODES:
+            raise ParameterError(f"runs with moving leaders are of up to {EXACT_NODES} agents; the graph has {n}")
+        if not F.size:
+            raise ParameterError("nobody listens to a leader, so nobody tracks; add edges")
+        self.followers, self.heads = F, np.setdiff1d(np.arange(n), F)
+        L = structure.graph.dense_laplacian()
+        self.L_F = L[np.ix_(F, F)]
+        try:
+            self.Q = -np.linalg.solve(self.L_F, L[np.ix_(F, self.heads)])
+        except np.linalg.LinAlgError:
+            raise ParameterError("the weights lie too far apart for a run: floats lose who follows whom") from None
+        self.speed, self.delta = float(leaders.speed), float(leaders.disturbance)
+        try:
+            self.weights = np.ones(F.size) if u is None else np.asarray(u, dtype=float)
+        except (TypeError, ValueError):
+            self.weights = np.empty(0)  # no numbers
+        if self.weights.shape != (F.size,) or not (np.isfinite(self.weights) & (self.weights > 0)).all():
+            raise ParameterError(f"u is not {F.size} positive numbers, one for each follower; leave it out")
+
+    def velocities(self, eps: np.ndarray) -> np.ndarray:
+        """Return the velocities of the leaders, ``(N - F,)``, where followers are off by ``eps``."""
+        k = int(np.argmax(np.abs(eps) / self.weights))
+        side = 1.0 if eps[k] >= 0 else -1.0
+        return np.asarray(-side * np.sign(self.Q[k]) * self.speed)
+
+    def pushes(self, eps: np.ndarray) -> np.ndarray:
+        """Return the disturbances of the followers, ``(F,)``."""
+        return self.delta * np.where(eps >= 0, 1.0, -1.0)
+
+    def targets(self, states: np.ndarray) -> np.ndarray:
+        """Return the targets for ``(N, M)`` states; of leaders their states."""
+        targets = states.copy()
+        targets[self.followers] = self.Q @ states[self.heads]
+        return targets
 
 
 @gated
@@ -99,42 +167,33 @@ def simulate_tracking(
     refuse_no_protocol(protocol)
     structure, steps = analyse(as_graph(graph)), whole_number(steps, "steps", 2, MOST_STEPS)
     worst = WorstLeaders(structure, protocol, leaders, u)
-    F, heads, L_F, Q = worst.followers, worst.heads, worst.L_F, worst.Q
+    F, heads = worst.followers, worst.heads
     x = np.array([float(value) for value in as_state(x0, structure.graph, "x0")])
-    limits = GainLimits(gain_cap=gain_cap)
-    limited = limits.limit(protocol.gain)
-    t, clock, last = _grid(limited, steps)
-    step_of = _Step(worst, leaders)
+    conditions = Conditions(None if gain_cap is None else GainLimits(gain_cap=gain_cap), leaders=leaders)
+    run = Setup(structure.graph, protocol, _instants(float(protocol.T), steps), conditions)
+    t, remaining, _ = run.instants
+    step_of, passed, highest = _Step(worst, leaders), np.diff(t), run.gains_before()[1:]
+    clock = np.diff(run.gain.clock(t, np.maximum(remaining, JUST_BEFORE)))
     states, targets, inputs = np.zeros((3, t.size, structure.graph.n_nodes))
-    lead, eps = x[heads], x[F] - Q @ x[heads]
-    begin = time.perf_counter()
-    gain = limited.value(t, np.maximum(1 - t / float(protocol.T), 0))
+    lead, eps = x[heads], x[F] - worst.Q @ x[heads]
     for i in range(t.size):
         states[i, heads] = targets[i, heads] = lead
-        targets[i, F] = Q @ lead
+        targets[i, F] = worst.Q @ lead
         states[i, F] = targets[i, F] + eps
-        inputs[i, F] = -gain[i] * (L_F @ eps)
-        if i + 1 < t.size:
-            moved, eps = step_of(eps, clock[i], last[i])
-            lead, inputs[i, heads] = lead + moved, moved / (t[i + 1] - t[i])
+        inputs[i, F] = -run.gains[i] * (worst.L_F @ eps)
+        if i < passed.size:
+            moved, eps = step_of(eps, clock[i], highest[i])
+            lead, inputs[i, heads] = lead + moved, moved / passed[i]
         inputs[i, F] += step_of.term
-    conditions, seconds = Conditions(None if limits.ideal else limits, leaders=leaders), time.perf_counter() - begin
-    run = stepped_run(structure.graph, protocol, t, states.T, inputs.T, conditions, NEAREST, seconds)
-    return replace(run, targets=targets.T)
+    return run.stepped(states.T, Tolerances(NEAREST, NEAREST), held_input=inputs.T, targets=targets.T)
 
 
-def _grid(limited: LimitedGain, steps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return instants, and of every step the clock that passes and the largest gain, infinite up to ``T`` uncapped."""
-    T = float(limited.gain.T)
-    remaining = steps_towards(T, T / steps, SHARE, NEAREST) / T
-    later = np.linspace(0, PAST * T, max(steps // 4, 2))[1:]
-    t, seen = T * (1 - remaining), np.maximum(remaining, NEAREST * 1e-3)
-    values = limited.value(t[1:], seen[1:])
-    if not limited.bounded:
-        values[-1] = np.inf
-    low = float(limited.value(2 * T))
-    passed = np.concatenate([np.diff(limited.clock(t, seen)), low * np.diff(later, prepend=0)])
-    return np.concatenate([t, T + later]), passed, np.concatenate([values, np.full(later.size, low)])
+def _instants(T: float, steps: int) -> Instants:
+    """Return the instants of a run, which goes on beyond ``T``."""
+    remaining = steps_towards(T, T / steps, STEP_SHARE, NEAREST) / T
+    later = T + np.linspace(0, PAST * T, max(steps // 4, 2))[1:]
+    t = np.append(T * (1 - remaining), later)
+    return Instants(t, np.append(remaining, np.zeros(later.size)), np.zeros(t.size))
 
 
 class _Step:

@@ -19,7 +19,7 @@ from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.model.disturbance import ExpressionDisturbance, SampledDisturbance, as_disturbance
 from ptcc_certify.model.limited_gain import Periods
 from ptcc_certify.model.parameters import parameter, readable
-from ptcc_certify.simulation.cvodes import Forcing, Phase
+from ptcc_certify.simulation.cvodes import Forcing, Motion, Phase
 from ptcc_certify.simulation.instants import Instants
 
 if TYPE_CHECKING:
@@ -63,22 +63,25 @@ class Bounded:
     bound: int | float | str | Fraction
 
 
-def forced(course: Course, limited: LimitedGain, instants: Instants, goal: float) -> tuple[np.ndarray, float | None]:
-    """Return the (M, N, S) states of a driven motion under a gain, and the residual at ``T`` if it has its pole there.
+def sample(
+    motion: Motion, limited: LimitedGain, instants: Instants, course: Course | None = None, goal: float = 0.0
+) -> tuple[np.ndarray, float | None]:
+    """Return the (M, N, S) states of a motion under a gain, and the residual at ``T`` if it has its pole there.
 
     Parameters
     ----------
-    course : Course
-        Of one graph.
+    motion : Motion
     limited : LimitedGain
         The gain that acts, not held over periods.
     instants : Instants
+        Where the gain has its pole, ``T`` is among them only with a course.
+    course : Course, optional
+        Of the motion; from ``1 - t/T = e^-40`` on to a pole it goes on upon the stretched clock, where nothing drives.
     goal : float
         Of the residual.
     """
-    (t, remaining, _), motion = instants, course.motion
+    (t, remaining, _), states, residual = instants, np.empty((instants.t.size, *motion.state.shape)), None
     T, rho1, pole = (float(value) for value in (limited.gain.T, limited.gain.rho1, limited.gain.pole))
-    states, residual = np.empty((t.size, *motion.state.shape)), None
     for stretch in limited.stretches:
         here = (remaining <= stretch.begin) & (remaining > stretch.end)
         beyond = bool((remaining <= stretch.end).any())
@@ -92,16 +95,16 @@ def forced(course: Course, limited: LimitedGain, instants: Instants, goal: float
             phase = Phase(T * (1 - stretch.begin), span, stretch.level, past=True)
             z, end = limited.elapsed(stretch, t, remaining)[here] / span, 1.0 if stretch.end >= 0 else math.inf
         last = end if beyond else min(float(z[-1]), end)
-        to_pole = stretch.level is None and not stretch.end
-        driven = min(last, _LAST_TAU) if to_pole else last
-        states[here] = motion.sample(phase, z, driven)
-        if to_pole and last >= _LAST_TAU:
-            with motion.at_rest():
-                course.clock = float(limited.gain.clock_at_tau(driven))
-                free, clock = z > driven, limited.gain.clock_at_tau(z)
-                if free.any():
-                    states[np.flatnonzero(here)[free]] = course.sample(clock[free], float(clock[-1]))
-                residual = course.settle(goal) if beyond else None
+        if course is None or phase.past or stretch.end or last < _LAST_TAU:
+            states[here] = motion.sample(phase, z, last)
+            continue
+        states[here] = motion.sample(phase, z, _LAST_TAU)
+        with motion.at_rest():
+            course.clock = float(limited.gain.clock_at_tau(_LAST_TAU))
+            free, clock = z > _LAST_TAU, limited.gain.clock_at_tau(z)
+            if free.any():
+                states[np.flatnonzero(here)[free]] = course.sample(clock[free], float(clock[-1]))
+            residual = course.settle(goal) if beyond else None
     return states, residual
 
 

@@ -11,9 +11,8 @@ for ``s`` to infinity, and from ``T`` on ``X' = -rho1 L X``. A simulation corrob
 from __future__ import annotations
 
 import inspect
-import time
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
@@ -32,25 +31,35 @@ from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.refusals import refuse_together
 from ptcc_certify.simulation.cvodes import Motion, Tolerances
-from ptcc_certify.simulation.instants import PAST, Instants, default_instants, wanted_instants
+from ptcc_certify.simulation.instants import PAST, default_instants, wanted_instants
 from ptcc_certify.simulation.interrupt import interruptible
 from ptcc_certify.simulation.late_messages import simulate_late
 from ptcc_certify.simulation.member_laplacians import Choice, Members
-from ptcc_certify.simulation.nominal import Bounded, as_forcing, forced, sample_and_hold
+from ptcc_certify.simulation.moving_leaders import simulate_tracking
+from ptcc_certify.simulation.nominal import Bounded, as_forcing, sample, sample_and_hold
 from ptcc_certify.simulation.sliding import SlidingMotion, rounding_slack
 from ptcc_certify.simulation.switched_motion import Course
 from ptcc_certify.simulation.switching_signals import ConstantSignal, Signal, as_signal
-from ptcc_certify.simulation.trajectory import RESOLVED, Conditions, Played, Trajectory
+from ptcc_certify.simulation.trajectory import RESOLVED, Conditions, Played, Setup, Trajectory
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import Exact, SignedDigraph
 
 
-class Sampling(TypedDict, total=False):
-    """Where a run is sampled, and how it is integrated.
+class RunOptions(TypedDict, total=False):
+    """What drives a run beside its graph, where it is sampled, and how it is integrated.
 
     Attributes
     ----------
+    sigma0 : state-like
+        Sliding mode: ``sigma(0)``, like ``x0``; without it 0, which leaves no reaching phase.
+    disturbance : Disturbance, str, number, callable or sequence
+        Sliding mode: whatever :func:`ptcc_certify.model.disturbance.as_disturbance` takes, such as
+        ``"sin(2*k*t)"``; by default the worst case, ``d_k = delta sign(sigma_k)``. It is refused where it exceeds
+        ``delta``, and of families where it reads the states. Nominal protocol: :class:`Bounded`, one that reads neither
+        states nor sliding variables; by default none.
+    noise : Bounded
+        Nominal protocol: what is added to every measurement, with an actuator that bounds the gain.
     times : increasing numbers >= 0
         The instants wanted, in units of time. One that a float cannot tell from ``T`` counts as ``T``.
     remaining : float
@@ -67,6 +76,9 @@ class Sampling(TypedDict, total=False):
         Sliding mode, for comparison only: integrate ``tanh(sigma/boundary_layer)`` instead of the sign.
     """
 
+    sigma0: Any
+    disturbance: Any
+    noise: Bounded | None
     times: Iterable[Exact] | None
     remaining: float
     samples: int
@@ -76,7 +88,8 @@ class Sampling(TypedDict, total=False):
     boundary_layer: float | None
 
 
-_DEFAULTS = Sampling(times=None, remaining=1e-8, samples=201, past=PAST, rtol=1e-11, atol=1e-11, boundary_layer=None)
+_DEFAULTS: dict[str, Any] = dict.fromkeys(("sigma0", "disturbance", "noise", "times", "boundary_layer"))
+_DEFAULTS |= {"remaining": 1e-8, "samples": 201, "past": PAST, "rtol": 1e-11, "atol": 1e-11}
 
 
 @gated
@@ -86,13 +99,10 @@ def simulate(
     x0: Any,
     signal: Any = None,
     *,
-    sigma0: Any = None,
-    disturbance: Any = None,
-    noise: Bounded | None = None,
     actuator: GainLimits | None = None,
     messages: LateMessages | None = None,
     leaders: MovingLeaders | None = None,
-    **sampling: Unpack[Sampling],
+    **options: Unpack[RunOptions],
 ) -> Trajectory:
     """Integrate the closed loop of a protocol from ``X(0) = x0`` to the deadline and past it.
 
@@ -120,15 +130,6 @@ def simulate(
         :func:`~ptcc_certify.simulation.switching_signals.as_signal`.
         ``X' = -gain(t) L(t) X``, the signal choosing ``L(t)``. With ``messages`` how old is what agents hear: a pattern
         of :func:`ptcc_certify.simulate_late`, or that and a seed, ``("varying", 3)``.
-    sigma0 : state-like, optional
-        Sliding mode: ``sigma(0)``, like ``x0``; without it 0, which leaves no reaching phase.
-    disturbance : Disturbance, str, number, callable or sequence, optional
-        Sliding mode: whatever :func:`ptcc_certify.model.disturbance.as_disturbance` takes, such as
-        ``"sin(2*k*t)"``; by default the worst case, ``d_k = delta sign(sigma_k)``. It is refused where it exceeds
-        ``delta``, and of families where it reads the states. Nominal protocol: :class:`Bounded`, one that reads neither
-        states nor sliding variables; by default none.
-    noise : Bounded, optional
-        Nominal protocol: what is added to every measurement, with an actuator that bounds the gain.
     actuator : GainLimits, optional
         Nominal protocol: limits of the input; without sampling if there is a disturbance or noise.
     messages : LateMessages, optional
@@ -137,9 +138,10 @@ def simulate(
     leaders : MovingLeaders, optional
         The run of :func:`ptcc_certify.simulate_tracking`, at instants of its own; nothing else acts on it. With
         ``messages`` that of :func:`ptcc_certify.simulate_late`.
-    **sampling : Sampling
-        Where the run is sampled, and how it is integrated: ``times``, ``remaining``, ``samples``, ``past``, ``rtol``,
-        ``atol``, ``boundary_layer``, see :class:`Sampling`.
+    **options : RunOptions
+        What drives the run: ``sigma0``, ``disturbance``, ``noise``; where it is sampled, and how it is integrated:
+        ``times``, ``remaining``, ``samples``, ``past``, ``rtol``, ``atol``, ``boundary_layer``, see
+        :class:`RunOptions`.
 
     Returns
     -------
@@ -177,23 +179,19 @@ def simulate(
     >>> run.final_state.round(9), bool((run.sliding.reaching_times < 1).all())
     (array([ 0.5, -0.5]), True)
     """
-    begin = time.perf_counter()
     refuse_no_protocol(protocol)
-    how, beside = _sampling(sampling), messages is not None or leaders is not None
+    how, beside = _with_defaults(options), messages is not None or leaders is not None
     family = as_family(graph) if not beside and (signal is not None or is_family(graph)) else None
     one = as_graph(graph) if family is None else family.modes[0].mandatory
-    layer = how["boundary_layer"]
-    only: dict[str, Any] = {"actuator": actuator, "noise": noise, "boundary_layer": layer}
+    sigma0, disturbance, layer = how["sigma0"], how["disturbance"], how["boundary_layer"]
+    only: dict[str, Any] = {"actuator": actuator, "noise": how["noise"], "boundary_layer": layer}
     if beside:
         foreign = only | {"disturbance": disturbance, "times": how["times"]}
         foreign |= {} if messages is not None else {"signal": signal, "actuator": None}
         _refuse_beside(one, messages, leaders, sigma0, foreign)
         if messages is not None:
-            heard: Any = signal if isinstance(signal, tuple) and len(signal) == 2 else (signal or "oldest", 0)
-            return simulate_late(one, protocol, messages, x0, pattern=heard[0], seed=heard[1], leaders=leaders)
+            return simulate_late(one, protocol, messages, x0, pattern=signal or "oldest", leaders=leaders)
         assert leaders is not None
-        from ptcc_certify.simulation.moving_leaders import simulate_tracking  # it loads SciPy
-
         return simulate_tracking(one, protocol, leaders, x0, gain_cap=_cap_alone(actuator))
     initial_state, tolerances = _floats(x0, one, "x0"), Tolerances.within(how["rtol"], how["atol"])
     manifold = None if sigma0 is None else _floats(sigma0, one, "sigma0")
@@ -208,26 +206,22 @@ def simulate(
     else:
         instants = wanted_instants(protocol, how["times"])
     played = ConstantSignal() if family is None else as_signal("random" if signal is None else signal)
-    run = _Run(one, family, played, protocol, instants, tolerances)
+    limits = None if actuator is None or actuator.ideal else actuator
+    run = _Run(one, protocol, instants, Conditions(limits), family=family, signal=played, tolerances=tolerances)
     with interruptible():
         if protocol.reaching is None:
-            result = run.nominal(initial_state, actuator, disturbance, noise)
-        else:
-            manifold = np.zeros(one.n_nodes) if manifold is None else manifold
-            result = run.sliding(initial_state, manifold, disturbance, layer)
-    return replace(result, stats=dict(result.stats) | {"seconds": time.perf_counter() - begin})
+            return run.nominal(initial_state, disturbance, how["noise"])
+        manifold = np.zeros(one.n_nodes) if manifold is None else manifold
+        return run.sliding(initial_state, manifold, disturbance, layer)
 
 
 @dataclass(frozen=True)
-class _Run:
-    """What is run: a graph, or a family under a signal, with a protocol, sampled at instants."""
+class _Run(Setup):
+    """A graph, or a family under a signal, under a protocol."""
 
-    graph: SignedDigraph
-    family: Family | None
-    signal: Signal
-    protocol: Protocol
-    instants: Instants
-    tolerances: Tolerances
+    family: Family | None = None
+    signal: Signal = field(kw_only=True)
+    tolerances: Tolerances = field(kw_only=True)
 
     @property
     def goal(self) -> float:
@@ -240,34 +234,30 @@ class _Run:
     def course(self, motion: Motion) -> Course:
         return Course(motion, lambda state: self.signal.play(motion.members, self.protocol.gain, state))
 
-    def nominal(self, x: np.ndarray, actuator: GainLimits | None, disturbance: Any, noise: Any) -> Trajectory:
+    def nominal(self, x: np.ndarray, disturbance: Any, noise: Any) -> Trajectory:
         """Return the run under the nominal protocol, whose gain may be limited, with what drives the agents."""
-        limited = (actuator or GainLimits()).limit(self.protocol.gain)
         t, remaining, _ = self.instants
         until = float(t[-1])
         forcing = as_forcing(self.graph, self.protocol.T, disturbance, noise, until) if self.family is None else None
-        held = limited.limits.sample_period is not None
+        held = self.gain.limits.sample_period is not None
         if forcing is not None and held:
             raise ParameterError("a run with a sample period takes no disturbance and no noise; leave one of them out")
-        if forcing is not None and forcing.noisy and not limited.bounded:
+        if forcing is not None and forcing.noisy and not self.gain.bounded:
             mend = "give a gain cap or stop before T"
             raise ParameterError(f"noise times a gain that becomes infinite at T is no input; {mend}")
         columns = x.reshape(self.graph.n_nodes, -1)
         unit = np.maximum(np.abs(columns).max(axis=0), forcing.size if forcing else 0.0)
         unit[unit == 0] = 1
         motion = Motion(self.members(), columns / unit, self.tolerances, forcing, unit)
-        inputs = residual = course = None
+        inputs, residual, course = None, None, self.course(motion)
         if held:
-            periods = limited.periods(until)
-            clock = periods.clock(t)
+            periods = self.gain.periods(until)
             states, inputs = sample_and_hold(self.graph, periods, motion.state, t)
             motion.stats["steps"] = int(periods.locate(t[-1:])[0][0])
+        elif forcing is None:
+            states, residual = self.on_the_clock(course, self.clock)
         else:
-            clock, course = limited.clock(t, remaining), self.course(motion)
-            if forcing is None:
-                states, residual = self.on_the_clock(course, clock)
-            else:
-                states, residual = forced(course, limited, self.instants, self.goal)
+            states, residual = sample(motion, self.gain, self.instants, course, self.goal)
         late = np.flatnonzero(remaining == 0)
         if residual is None and self.protocol.prescribed and late.size:
             residual = motion.members.imbalance(states[late[0]], Choice(0) if self.family is None else None)
@@ -275,11 +265,9 @@ class _Run:
         def restore(values: np.ndarray) -> np.ndarray:
             return (np.moveaxis(values, 0, -1) * unit[:, None]).reshape(*x.shape, t.size)
 
-        conditions = Conditions(
-            None if actuator is None or actuator.ideal else actuator, None if forcing is None else forcing.text
-        )
-        more = {"conditions": conditions, "held_input": None if inputs is None else restore(inputs)}
-        return self.trajectory(motion, course, clock, restore(states), residual, **more)
+        more: dict[str, Any] = {"held_input": None if inputs is None else restore(inputs)}
+        met = self if forcing is None else replace(self, conditions=replace(self.conditions, forcing=forcing.text))
+        return met.result(course, restore(states), residual, **more)
 
     def sliding(self, x: np.ndarray, sigma0: np.ndarray, disturbance: Any, layer: float | None) -> Trajectory:
         """Return the run under the sliding-mode protocol, the Filippov solution or its imitation."""
@@ -294,17 +282,16 @@ class _Run:
         bounded_by = met.check(protocol.delta, self.graph.labels, until, rounding_slack(protocol))
         layer = None if layer is None else number_within(layer, "boundary_layer", 1e-12, 1e12)
         motion = SlidingMotion(self.members(), protocol, met, (x, sigma0), self.tolerances, layer)
-        clock = np.asarray(GainLimits().limit(protocol.gain).clock(t, self.instants.remaining))
         course = self.course(motion)
         if layer is not None:
             states, residual = motion.imitation(self.instants)
         else:
             later, states = motion.reach(course, self.instants.z)
-            nominal, residual = self.on_the_clock(course, clock[later], t[later])
+            nominal, residual = self.on_the_clock(course, self.clock[later], t[later])
             states[later, :, 0] = nominal[:, :, 0]
         y, sigma = states.T * motion.unit
         part = motion.part(self.instants, y + sigma, sigma, bounded_by)
-        return self.trajectory(motion, course, clock, y + sigma, residual, sliding=part)
+        return self.result(course, y + sigma, residual, sliding=part)
 
     def on_the_clock(
         self, course: Course, clock: np.ndarray, t: np.ndarray | None = None
@@ -322,69 +309,17 @@ class _Run:
             states.append(course.past(t[~before], T, rho1, changes))
         return np.concatenate(states), residual
 
-    def trajectory(
-        self,
-        motion: Motion,
-        course: Course | None,
-        clock: np.ndarray,
-        states: np.ndarray,
-        residual: float | None,
-        **more: Any,
-    ) -> Trajectory:
-        """Return what was run."""
+    def result(self, course: Course, states: np.ndarray, residual: float | None, **more: Any) -> Trajectory:
+        """Return what was run, with the members that acted."""
         played = None
-        if self.family is not None and course is not None:
-            told = tuple(course.choices), np.array(course.switches), np.array(course.acting, dtype=np.int64)
-            played = Played(self.family, self.signal.text, *told)
-        return Trajectory(
-            graph=self.graph,
-            protocol=self.protocol,
-            t=self.instants.t,
-            remaining=self.instants.remaining,
-            clock=clock,
-            states=states,
-            tolerances=self.tolerances,
-            deadline_residual=residual,
-            stats=motion.stats,
-            played=played,
-            **more,
-        )
+        if self.family is not None:
+            acted = tuple(course.choices), np.array(course.switches), np.array(course.acting, dtype=np.int64)
+            played = Played(self.family, self.signal.text, *acted)
+        return self.trajectory(states, self.tolerances, residual, course.motion.stats, played=played, **more)
 
 
-def simulate_formation(graph: Any, protocol: Protocol, x0: Any, offsets: Any, **options: Any) -> Trajectory:
-    """Run single integrators in a formation: less their places they move as they do without.
-
-    Parameters
-    ----------
-    graph, protocol, x0, **options
-        As for :func:`simulate`; ``x0`` is where agents begin.
-    offsets : state-like
-        Their places.
-
-    Returns
-    -------
-    Trajectory
-        Its ``positions`` are where agents are, its ``states`` less their places.
-
-    Examples
-    --------
-    >>> from ptcc_certify.simulation.run import simulate_formation
-    >>> team = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
-    >>> run = simulate_formation(team, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], [0, 5], times=[0, 1])
-    >>> run.positions.round(9)
-    array([[ 3. , -0.5],
-           [ 1. ,  4.5]])
-    """
-    graph = as_graph(graph)
-    rows, places = as_states(x0, graph, "x0"), as_states(offsets, graph, "offsets")
-    if len(rows[0]) != len(places[0]):
-        raise ParameterError("offsets", f"has {len(places[0])} numbers for each agent, x0 has {len(rows[0])}")
-    less = [[x - h for x, h in zip(*pair, strict=True)] for pair in zip(rows, places, strict=True)]
-    return simulate(graph, protocol, less, **options).in_places(_floats(places, graph, "offsets"))
-
-
-def _sampling(given: Sampling) -> Sampling:
-    """Return all of what a run is sampled and integrated by, or refuse a keyword that is none of it."""
+def _with_defaults(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return all options of a run, or refuse a keyword that is none of them."""
     for name in given:
         if name not in _DEFAULTS:
             parameters = [*inspect.signature(simulate).parameters][:-1]

@@ -73,26 +73,6 @@ class Signal(ABC):
         return f"{type(self).__name__}({self.text})"
 
 
-class ConstantSignal(Signal):
-    """One member for ever.
-
-    Parameters
-    ----------
-    mode : int or str
-        Its number from 0, or its name.
-    level : float or sequence of float
-        Where the uncertain weights lie: 0 is ``w-``, 1 is ``w+``.
-    """
-
-    def __init__(self, mode: int | str = 0, level: float | Sequence[float] = MIDDLE):
-        self.mode, self.level = mode, level
-        self.text = f"constant, mode {mode if isinstance(mode, str) else mode + 1}"
-
-    def play(self, members: Members, gain: Gain, state: State) -> Iterator[Stretch]:
-        """Yield it."""
-        yield Stretch(members.choice(self.mode, self.level), math.inf)
-
-
 class TableSignal(Signal):
     """Members from a table of instants.
 
@@ -185,6 +165,22 @@ class TableSignal(Signal):
         """Return the rows from ``T`` on."""
         late = [] if self.clock else [row for row in self.rows if row[0] >= T]
         return [(t, members.choice(mode, level)) for t, mode, level in late]
+
+
+class ConstantSignal(TableSignal):
+    """One member for ever.
+
+    Parameters
+    ----------
+    mode : int or str
+        Its number from 0, or its name.
+    level : float or sequence of float
+        Where the uncertain weights lie: 0 is ``w-``, 1 is ``w+``.
+    """
+
+    def __init__(self, mode: int | str = 0, level: float | Sequence[float] = MIDDLE):
+        super().__init__([(0, mode, level)], clock=True)
+        self.text = f"constant, mode {mode if isinstance(mode, str) else mode + 1}"
 
 
 class PeriodicSignal(Signal):

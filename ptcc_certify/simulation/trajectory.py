@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import time
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -16,6 +17,8 @@ from ptcc_certify.graphs.array_holders import ByValue
 from ptcc_certify.graphs.labels import import_pandas, position
 from ptcc_certify.graphs.rationals import number_within, shorten
 from ptcc_certify.lazy_report import Shown, rendered
+from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.simulation.instants import Instants
 from ptcc_certify.simulation.member_laplacians import Choice, Members
 
 if TYPE_CHECKING:
@@ -24,14 +27,16 @@ if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.model import Protocol, ReachingProtocol
-    from ptcc_certify.model.gain_limits import GainLimits
     from ptcc_certify.model.late_messages import LateMessages
+    from ptcc_certify.model.limited_gain import LimitedGain
     from ptcc_certify.model.moving_leaders import MovingLeaders
     from ptcc_certify.model.virtual_positions import TrackingProtocol
     from ptcc_certify.simulation.cvodes import Tolerances
 
 #: A state at the deadline is settled when its residual is below this multiple of the tolerances.
 RESOLVED = 100
+#: ``1 - t/T`` just before ``T``.
+JUST_BEFORE = 1e-10
 
 
 class ByAgent:
@@ -260,6 +265,78 @@ class Conditions(ByValue):
 
     def __post_init__(self) -> None:
         self.lock()
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Who runs under what, at which instants: the gain that acts there, its clock, and what comes of it.
+
+    Attributes
+    ----------
+    graph : SignedDigraph
+    protocol : Protocol
+    instants : Instants
+    conditions : Conditions
+    begin : float
+        When the run was begun, for its ``seconds``.
+    """
+
+    graph: SignedDigraph
+    protocol: Protocol
+    instants: Instants
+    conditions: Conditions = Conditions()
+    begin: float = field(default_factory=time.perf_counter)
+
+    @cached_property
+    def gain(self) -> LimitedGain:
+        """The gain that acts."""
+        return (self.conditions.actuator or GainLimits()).limit(self.protocol.gain)
+
+    @cached_property
+    def gains(self) -> np.ndarray:
+        """(M,) array: the gain that acts at the instants."""
+        return self.gain.value(self.instants.t, self.instants.remaining)
+
+    @cached_property
+    def clock(self) -> np.ndarray:
+        """(M,) array: the stretched clock at the instants."""
+        return self.gain.clock(self.instants.t, self.instants.remaining)
+
+    def gains_before(self) -> np.ndarray:
+        """Return the gain that acts at the instants, at ``T`` that just before it, infinite if it has its pole."""
+        gains, T = self.gains.copy(), float(self.protocol.T)
+        gains[self.instants.t == T] = self.gain.value(T, JUST_BEFORE) if self.gain.bounded else np.inf
+        return gains
+
+    def trajectory(
+        self,
+        states: np.ndarray,
+        tolerances: Tolerances,
+        deadline_residual: float | None,
+        stats: Mapping[str, float],
+        **more: Any,
+    ) -> Trajectory:
+        """Return what was run, with whatever else a :class:`Trajectory` keeps."""
+        return Trajectory(
+            graph=self.graph,
+            protocol=self.protocol,
+            t=self.instants.t,
+            remaining=self.instants.remaining,
+            clock=self.clock,
+            states=states,
+            tolerances=tolerances,
+            deadline_residual=deadline_residual,
+            stats={**stats, "seconds": time.perf_counter() - self.begin},
+            conditions=self.conditions,
+            **more,
+        )
+
+    def stepped(self, states: np.ndarray, tolerances: Tolerances, **more: Any) -> Trajectory:
+        """Return what was run in steps of closed form, from (N, M) states."""
+        size, end = max(float(np.abs(states[:, 0]).max()), 1e-300), int(np.argmax(self.instants.remaining == 0))
+        residual = Members(self.graph).imbalance(states[:, end], Choice(0)) / size
+        count = self.instants.t.size - 1
+        return self.trajectory(states, tolerances, residual, {"steps": count, "rhs": count}, **more)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -17,8 +17,9 @@ import numpy as np
 
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.simulation.agents import MOST_STATES, AgentsMotion, AgentsTrajectory, shares_left
+from ptcc_certify.simulation.agents import MOST_STATES, AgentsMotion, AgentsTrajectory, instants_left
 from ptcc_certify.simulation.late_messages import simulate_late
+from ptcc_certify.simulation.nominal import sample
 from ptcc_certify.simulation.run import simulate
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.model.base import Protocol
     from ptcc_certify.model.late_messages import LateMessages
+    from ptcc_certify.model.limited_gain import LimitedGain
     from ptcc_certify.model.moving_leaders import MovingLeaders
     from ptcc_certify.model.virtual_positions import TrackingProtocol
     from ptcc_certify.simulation.cvodes import Phase
@@ -46,17 +48,15 @@ class _Tracking(AgentsMotion):
     moved = 1
 
     def __init__(self, graph: SignedDigraph, state: np.ndarray, of: TrackingProtocol, rtol: float):
-        super().__init__(graph, state, of.gain, of.gain_cap, rtol)
+        super().__init__(graph, state, rtol)
         self._a1, self._a2 = float(of.a1), float(of.a2)
 
     def slope(self, x: ca.MX, phase: Phase, z: ca.MX) -> ca.MX:
         """Return the slope of positions, scaled velocities and virtual positions on the clock of the phase."""
         import casadi as ca
 
-        a1, a2, gain = self._a1, self._a2, self._gain
-        R = phase.rate(z, ca.exp)
-        h = phase.nominal(R)
-        theta = ca.MX(0) if phase.past else (1 - float(gain.rho1) * R / h) ** 2 / float(gain.pole)
+        a1, a2, R = self._a1, self._a2, phase.rate(z, ca.exp)
+        h, theta = phase.nominal(R), phase.shrinking(R)
         position, scaled, virtual = (x[:, i] for i in range(3))
         e, r = -self._product(virtual), position - virtual
         pushed = -a1 * theta * r - a1 * (scaled - e) - a2 * (scaled + a1 * r) - theta * scaled
@@ -105,25 +105,23 @@ def simulate_vehicles(
     """
     if 3 * graph.n_nodes > MOST_STATES:
         raise ParameterError(f"more than {MOST_STATES} numbers to integrate; simulate fewer agents")
-    gain, cap, T = protocol.gain, protocol.gain_cap, float(protocol.gain.T)
-    q = shares_left(remaining, samples, cap)
-    turn = 0.0
-    if cap is not None:
-        turn = 1.0 if cap <= gain.first else float(gain.pole) / (T * (float(cap) - float(gain.rho1)))
-    limits = GainLimits(gain_cap=cap).limit(gain)
-    g = limits.value(T * (1 - q), remaining=q)
-    if cap is not None:
-        g = np.maximum.accumulate(g)  # which stays what it came to
+    limited = GainLimits(gain_cap=protocol.gain_cap).limit(protocol.gain)
+    instants = instants_left(protocol.gain, remaining, samples, protocol.gain_cap)
+    g = _gain_kept(limited, instants.t, instants.remaining)
     first = np.array([x0, np.asarray(v0, dtype=float) / g[0], x0], dtype=float).T
-    states = _Tracking(graph, first, protocol, rtol).run(q, turn)
-    x, w, z = states[:, :, 0].T, states[:, :, 1].T, states[:, :, 2].T
+    states, _ = sample(_Tracking(graph, first, protocol, rtol), limited, instants)
+    x, w, z = states.transpose(2, 1, 0)
     a1, a2 = float(protocol.a1), float(protocol.a2)
     theta = _slope(protocol, g) / g**2
     e = -(graph.laplacian() @ z)
     u = g**2 * (-a1 * theta * (x - z) - a1 * (w - e) - a2 * (w + a1 * (x - z)))
-    moved = np.stack([x, w * g], axis=1)[:, None]
-    instants = T * (1 - q), q, limits.clock(T * (1 - q), remaining=q)
-    return _motion_of(graph, protocol, instants, moved, u, rtol)
+    clock = limited.clock(instants.t, instants.remaining)
+    return _motion_of(graph, protocol, (instants.t, instants.remaining, clock), (x, w * g, u), rtol)
+
+
+def _gain_kept(limited: LimitedGain, t: np.ndarray, remaining: np.ndarray) -> np.ndarray:
+    """Return the gain of the tracking, which from ``T`` on stays what it came to."""
+    return np.maximum.accumulate(limited.value(t, remaining))
 
 
 def _slope(protocol: TrackingProtocol, g: np.ndarray) -> np.ndarray:
@@ -151,16 +149,22 @@ def follow_in_motion(run: Trajectory, protocol: TrackingProtocol, v0: Sequence[F
     protocol : TrackingProtocol
     v0 : sequence of N Fraction
     """
-    x, v, u = _followed(run, protocol, v0)
-    moved = np.stack([x, v], axis=1)[:, None]
-    return _motion_of(run.graph, protocol, (run.t, run.remaining, run.clock), moved, u, run.tolerances.rtol)
+    clocks = run.t, run.remaining, run.clock
+    return _motion_of(run.graph, protocol, clocks, _followed(run, protocol, v0), run.rtol)
 
 
 def _motion_of(
-    graph: SignedDigraph, protocol: TrackingProtocol, instants: tuple[Any, Any, Any], moved: Any, u: Any, rtol: float
+    graph: SignedDigraph,
+    protocol: TrackingProtocol,
+    clocks: tuple[Any, Any, Any],
+    motion: tuple[Any, Any, Any],
+    rtol: float,
 ) -> AgentsTrajectory:
+    """Return a run from positions, velocities and inputs, (N, M) each."""
+    x, v, u = motion
     tracking: Any = protocol  # nothing of an AgentsProtocol is asked of a run by itself
-    return AgentsTrajectory(graph, tracking, *instants, moved, np.full_like(moved, np.nan), u[:, None], rtol, 0.0)
+    moved = np.stack([x, v], axis=1)[:, None]
+    return AgentsTrajectory(graph, tracking, *clocks, moved, np.full_like(moved, np.nan), u[:, None], rtol, 0.0)
 
 
 def _followed(
@@ -168,12 +172,11 @@ def _followed(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return positions, velocities and inputs of vehicles, (N, M) each; NaN where the gain is too large to tell."""
     a1, a2, z, s = float(protocol.a1), float(protocol.a2), run.states, run.clock
-    gain = GainLimits(gain_cap=protocol.gain_cap).limit(protocol.gain)
-    g = gain.value(run.t, remaining=run.remaining)
-    pulled = run.input
-    if protocol.gain_cap is not None:  # at T as just before it, where z is still drawn with the gain it came to
-        acts, g = g, np.maximum.accumulate(g)
-        pulled = np.where(run.t == float(protocol.gain.T), pulled * g / acts, pulled)
+    limited = GainLimits(gain_cap=protocol.gain_cap).limit(protocol.gain)
+    g = _gain_kept(limited, run.t, run.remaining)
+    # At T as just before it, where z is still drawn with the gain it came to.
+    acts = limited.value(run.t, run.remaining)
+    pulled = np.where(run.t == float(protocol.gain.T), run.input * g / acts, run.input)
     begun = np.array([float(x) for x in v0])[:, None]
     with np.errstate(invalid="ignore", over="ignore"):
         r = begun * np.exp(-a2 * s)

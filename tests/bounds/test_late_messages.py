@@ -101,7 +101,7 @@ def _judge_late(seed: int, patterns: tuple[str, ...] = PATTERNS, apart: bool = F
     start = [float(x) for x in x0]
     ratios = []
     for pattern in patterns:
-        run = simulate_late(structure.graph, protocol, messages, start, pattern=pattern, seed=seed, steps=300)  # type: ignore[arg-type]
+        run = simulate_late(structure.graph, protocol, messages, start, pattern=(pattern, seed), steps=300)  # type: ignore[arg-type]
         ratios.append(_worst(bounds, run, np.asarray(ends, dtype=float)))
         assert ratios[-1] <= 1 + ROUNDING, (seed, pattern)
     return ratios
@@ -157,7 +157,7 @@ def _judge_settling(seed: int, patterns: tuple[str, ...] = PATTERNS) -> float:
     assert cert.verdict == "certified" and cert.late is not None and cert.late.settling is not None, (seed, cert.notes)
     end, worst = np.asarray(cert.final_state, dtype=float), 0.0
     for pattern in patterns:
-        run = simulate_late(graph, protocol, messages, [float(x) for x in x0], pattern=pattern, seed=seed, steps=300)  # type: ignore[arg-type]
+        run = simulate_late(graph, protocol, messages, [float(x) for x in x0], pattern=(pattern, seed), steps=300)  # type: ignore[arg-type]
         away = np.maximum(np.abs(run.states - end[:, None]) - FLOOR * 10 * float(max(map(abs, x0))), 0)
         ratios = [away / np.maximum(cert.late.settling.deviation_bound(cert.late.case, run.t), 1e-300)]
         ratios.append(away[:, -1] / np.maximum(cert.late.settling.residual, 1e-300))
@@ -477,7 +477,7 @@ def test_runs_refuse_what_they_cannot_run_by_name() -> None:
         (late, [1, 0, 0], {}, "x0"),
         (late, [1, math.nan], {}, "x0"),
         (late, [1, 0], {"steps": 0}, "steps"),
-        (late, [1, 0], {"seed": -1}, "seed"),
+        (late, [1, 0], {"pattern": ("varying", -1)}, "seed"),
         (late, [1, 0], {"pattern": "never"}, "pattern"),
         (late, [1, 0], {"deadlines": [1]}, "deadlines are 1 for 2 agents"),
         (LateMessages(delay="1e-9"), [1, 0], {}, "more than 20,000 steps"),

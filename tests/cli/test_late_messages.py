@@ -503,6 +503,7 @@ def table(text: str) -> dict[str, np.ndarray]:
             "oldest",
         ),
         (("--quantisation", "0.5"), LateMessages(value_error="0.25"), "varying"),
+        (("--delay", "0.05", "--noise", "0.1"), LateMessages("0.05", value_error="0.2"), "oldest"),
     ],
 )
 def test_simulate_runs_with_late_messages(words: tuple[str, ...], messages: LateMessages, pattern: str) -> None:
@@ -514,7 +515,7 @@ def test_simulate_runs_with_late_messages(words: tuple[str, ...], messages: Late
     columns, protocol = table(run.out), NominalProtocol(T=1, rho1=1, rho2=3, kappa=1)
     graph = read_graph("team.csv")
     own = simulate(graph, protocol, [1, 3, 4, -4], messages=messages, signal=(pattern, 4))
-    direct = simulate_late(graph, protocol, messages, [1, 3, 4, -4], pattern=pattern, seed=4)
+    direct = simulate_late(graph, protocol, messages, [1, 3, 4, -4], pattern=(pattern, 4))
     assert own == direct and own.deadline_index == own.t.size - 1
     for label, states, inputs in zip(graph.labels, own.states, own.input, strict=True):
         assert columns[label].tolist() == states.tolist()
@@ -550,7 +551,6 @@ def test_simulate_draws_such_runs_and_takes_them_from_a_scenario(words: tuple[st
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--delay", "0.1", "--noise", "1", "--gain-cap", "9"), "--noise: is not simulated with late messages"),
         (("--delay", "0.1", "--stop-before", "0.1"), "--stop-before: is not simulated with late messages"),
         (("--delay", "0.1", "--steps", "9"), "--steps: is not simulated with late messages"),
         (("--delay", "0.1", "--samples", "9"), "--samples: is not simulated with late messages"),

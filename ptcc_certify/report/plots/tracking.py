@@ -8,13 +8,12 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ptcc_certify.bounds.delay.late_messages import LateBounds
-from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.asked_run import late_run
+from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.errors import Change, ParameterError
 from ptcc_certify.report.plots.decay import NONE, NothingDecays
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.report.plots.subject import certificate_of, certifies_family
-from ptcc_certify.simulation.late_messages import can_run, simulate_late
-from ptcc_certify.simulation.moving_leaders import simulate_tracking
 from ptcc_certify.simulation.trajectory import Trajectory
 
 #: How runs with late messages are drawn, by how old is what agents hear.
@@ -81,7 +80,7 @@ def plot_tracking(subject: Any, *, ax: Axes | None = None, time_unit: str = "") 
     if not certificate.of_family:
         if x0 is None or certificate.proof.final_state is None:
             raise ParameterError("the certificate has no initial state to run from; certify with x0")
-        t = _draw_runs(ax, certificate, late, [float(x) for x in x0])
+        t = _draw_runs(ax, certificate.graph_proof, late)
     _draw_bound(ax, late, t)
     if late.tracks:
         ax.axvline(T, color=BEHIND, linewidth=0.8, linestyle=":", label="$T$")
@@ -91,37 +90,32 @@ def plot_tracking(subject: Any, *, ax: Axes | None = None, time_unit: str = "") 
     return finished(ax, time_label("time $t$", time_unit), rf"$\max_k |x_k(t) - x_k^*{moving}|$")
 
 
-def _draw_runs(ax: Axes, certificate: Certificate, late: LateBounds, start: list[float]) -> np.ndarray:
+def _draw_runs(ax: Axes, proof: GraphProof, late: LateBounds) -> np.ndarray:
     """Draw the runs of one graph; return their instants."""
-    nodes, ends = certificate.graph_proof.structure.followers, np.asarray(certificate.proof.final_state, dtype=float)
+    nodes, ends = proof.structure.followers, np.asarray(proof.final_state, dtype=float)
     if not nodes.size or late.vehicles is not None or late.of_all:
-        nodes = np.arange(certificate.graph_proof.graph.n_nodes)
-    t = np.linspace(0, float(certificate.protocol.T), 401)
-    for run, style in _runs(certificate, late, start):
+        nodes = np.arange(proof.graph.n_nodes)
+    t = np.linspace(0, float(proof.protocol.T), 401)
+    for run, style in _runs(proof, late):
         aims = ends[:, None] if run.targets is None else run.targets
         ax.plot(run.t, np.abs(run.states - aims)[nodes].max(axis=0), **style)
         t = run.t
     return t
 
 
-def _runs(certificate: Certificate, late: LateBounds, start: list[float]) -> list[tuple[Trajectory, dict[str, Any]]]:
+def _runs(proof: GraphProof, late: LateBounds) -> list[tuple[Trajectory, dict[str, Any]]]:
     """Return the runs that are drawn, and how."""
-    graph, protocol = certificate.graph_proof.graph, certificate.protocol
+    drawn: list[tuple[dict[str, Any], dict[str, Any]]] = []
     if late.vehicles is not None:
-        seen = certificate.asked_trajectory
-        return [] if seen is None else [(seen, {"color": RUN, "linewidth": 1.1, "label": "vehicles"})]
-    if late.tracks and late.leaders is not None:
-        u, cap = late.rows[0].witness.u, late.messages.gain_cap
-        run = simulate_tracking(graph, protocol, late.leaders, start, u=u, steps=400, gain_cap=cap)
-        return [(run, {"color": RUN, "linewidth": 1.1, "label": "worst leaders"})]
-    drawn = _RUNS if can_run(protocol, late.messages) and not late.case.signed else {}
-    if not late.messages.age:
-        drawn = {"oldest": {**_RUNS["oldest"], "label": "values as far off as allowed"}} if drawn else {}
-    more = {"leaders": late.leaders}
-    return [
-        (simulate_late(graph, protocol, late.messages, start, pattern=pattern, **more), style)  # type: ignore[arg-type]
-        for pattern, style in drawn.items()
-    ]
+        drawn = [({}, {"color": RUN, "linewidth": 1.1, "label": "vehicles"})]
+    elif late.tracks:
+        drawn = [({"steps": 400}, {"color": RUN, "linewidth": 1.1, "label": "worst leaders"})]
+    elif not late.messages.age and not late.case.signed:
+        drawn = [({}, {**_RUNS["oldest"], "label": "values as far off as allowed"})]
+    elif not late.case.signed:
+        drawn = [({"pattern": pattern}, style) for pattern, style in _RUNS.items()]
+    runs = [(late_run(proof, late, **options), style) for options, style in drawn]
+    return [(run, style) for run, style in runs if run is not None]
 
 
 def _draw_bound(ax: Axes, late: LateBounds, t: np.ndarray) -> None:
