@@ -29,6 +29,7 @@ from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.report.page import report_html
+from ptcc_certify.report.report_file import write_report
 from ptcc_certify.report.statement import report_latex
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
@@ -430,3 +431,22 @@ def test_page_and_latex_tell_no_end_of_another_problem(name: str, tmp_path: Path
     assert "numerical), under the proved bound" not in page and "at most: the proved bound for every signal" in page
     assert f"occurs at $T$ for every such choice, {without}: as" in report_latex(saved)
     assert saved.to_pandas()["keeps"].tolist() == [not made.leaders_move, False, False]
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("late", "late messages"),
+        ("capped", "late and inexact messages"),
+        ("leaders that move", "leaders that move"),
+        ("a cap", "a gain cap"),
+        ("disturbances", "disturbances"),
+        ("noise and disturbances under a cap", "inexact messages"),
+    ],
+)
+def test_a_page_of_a_family_tells_why_there_is_no_run(name: str, why: str, tmp_path: Path):
+    certified(name).save(tmp_path / "c.json")
+    write_report(tmp_path / "c.json", tmp_path / "c.html")
+    page = (tmp_path / "c.html").read_text("utf-8")
+    assert f"with {why} none is made of a family" in page
+    assert ("however leaders move" in page) == certified(name).leaders_move
