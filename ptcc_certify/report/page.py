@@ -184,6 +184,7 @@ def _view(saved: Certificate) -> dict[str, Any]:
     advised = next((piece.number for piece in assessment.advice if isinstance(piece, Change)), "")
     begins = saved.initial_state if saved.proof.agents is None else saved.proof.agents.initial_state
     certified = saved.verdict == "certified"
+    caption, *states = states_table(saved)
     lacks = [
         text
         for text, lacking in {
@@ -203,7 +204,7 @@ def _view(saved: Certificate) -> dict[str, Any]:
         "beside_law": beside_law(saved),
         "equations": texts.formula_svg(protocol_latex(saved), inline=False),
         "parameters": [(name, getattr(saved.protocol, name)) for name in texts.parameter_names(saved.protocol)],
-        "states": states_table(saved),
+        "states": (texts.indexed(caption), *states),
         "reaching": [] if saved.direct else list(islice(pairs, ROWS)),
         "begins": begins is not None,
         "sampled": any(limits.sample_period is not None for limits in saved.limits),
