@@ -12,7 +12,7 @@ near to ``T``. The common motion is that of one agent without neighbours.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,8 +28,6 @@ from ptcc_certify.simulation.nominal import sample
 from ptcc_certify.simulation.trajectory import ByAgent, csv_text
 
 if TYPE_CHECKING:
-    from fractions import Fraction
-
     import casadi as ca
 
     from ptcc_certify.graphs.digraph import SignedDigraph
@@ -210,8 +208,8 @@ def simulate_agents(
     N, d, n = xi.shape
     if N * d * n > MOST_STATES:
         raise SimulationError(f"more than {MOST_STATES} numbers to integrate; simulate fewer agents")
-    instants = instants_left(protocol.gain, remaining, samples, protocol.gain_cap)
-    t, q, _ = instants
+    t, q, reaching = instants_left(protocol.gain, remaining, samples)
+    seen = (q > 0) | (protocol.gain_cap is not None)  # at T itself without a cap the clock is infinite
     h = np.array([[float(x) for x in row] for row in protocol.offsets])
     xi[:, :, 0] -= h
     U, kernel, block = _split(graph)
@@ -219,33 +217,42 @@ def simulate_agents(
     common = kernel @ coordinates[U.shape[1] :]
     zeta0 = 1 / protocol.value(1.0)
     scale = np.tile(zeta0 ** np.arange(n), d)
-    clock = protocol.clock(q)
     begin = coordinates[: U.shape[1]] * scale
-    z = np.zeros((len(q), *begin.shape))
+    z = np.where(seen[:, None, None], 0.0, np.full(begin.shape, np.nan))
     if np.abs(begin).max(initial=0):
-        limited = GainLimits(gain_cap=protocol.gain_cap).limit(protocol.gain)
-        z, _ = sample(_Deviations(graph, begin, block, protocol, rate, rtol), limited, instants)
+        limited, instants = GainLimits(gain_cap=protocol.gain_cap).limit(protocol.gain), Instants(t, q, reaching)
+        motion = _Deviations(graph, begin, block, protocol, rate, rtol)
+        z[seen], _ = sample(motion, limited, Instants(*(values[seen] for values in instants)))
     scaled = np.moveaxis(np.einsum("km,imc->ikc", U, z).reshape(len(q), N, d, n), 0, -1)
-    free = np.einsum("mij,kdj->kdim", _free_motion(protocol, q), common.reshape(N, d, n))
-    eta = np.array([protocol.value(x) for x in q])
-    powers = eta ** np.arange(n)[:, None]
-    deviations = scaled * powers * np.exp(-rate * clock / 2)
-    all_states = free + deviations
-    control = _input(graph, protocol, scaled * np.exp(-rate * clock / 2), free, eta)
+    nearly = np.where(seen, q, _NEXT)
+    free = np.einsum("mij,kdj->kdim", _free_motion(protocol, nearly), common.reshape(N, d, n))
+    clock, eta = protocol.clock(q), np.array([protocol.value(x) for x in nearly])
+    deviations = scaled * np.exp(-rate * np.where(seen, clock, 0.0) / 2)
+    all_states = free + deviations * eta ** np.arange(n)[:, None]
+    if not seen[-1]:
+        slowest = np.linalg.eigvals(block).real.min(initial=np.inf) * float(protocol.gain.pole)
+        all_states[..., -1] = _at_deadline(protocol, free[..., -1], protocol.agree_if_above(slowest))
+    control = _input(graph, protocol, deviations, free, eta)
     all_states[:, :, 0] += h[:, :, None]
     control += float(protocol.plant[0]) * h[:, :, None]
-    run = AgentsTrajectory(graph, protocol, t, q, clock, all_states, scaled, control, rtol, rate)
-    if protocol.gain_cap is not None:
-        return run
-    slowest = np.linalg.eigvals(block).real.min(initial=np.inf) * float(protocol.gain.pole)
-    return _with_deadline(run, common.reshape(N, d, n), h, protocol.agree_if_above(slowest))
+    return AgentsTrajectory(graph, protocol, t, q, clock, all_states, scaled, control, rtol, rate)
 
 
-def instants_left(gain: Gain, remaining: float, samples: int, cap: Fraction | None) -> Instants:
-    """Return instants: so many uniform in ``tau``, as many in ``t``; with ``T`` itself under a cap."""
+def _at_deadline(protocol: AgentsProtocol, free: np.ndarray, agreed: bool) -> np.ndarray:
+    """Return the states at ``T``, where deviations are 0; those of derivatives only if they agree."""
+    last = free.copy()
+    if any(protocol.own):
+        last[:, :, 1:] = 0.0  # they rest
+    if not agreed:
+        last[:, :, 1:] = np.nan
+    return last
+
+
+def instants_left(gain: Gain, remaining: float, samples: int) -> Instants:
+    """Return instants: so many uniform in ``tau``, as many in ``t``, and ``T`` itself."""
     samples = whole_number(samples, "samples", 2, 100_000)
-    q = np.unique(np.concatenate([np.geomspace(remaining, 1, samples), np.linspace(remaining, 1, samples)]))[::-1]
-    q = q if cap is None else np.append(q, 0.0)
+    q = np.concatenate([np.geomspace(remaining, 1, samples), np.linspace(remaining, 1, samples), [0.0]])
+    q = np.unique(q)[::-1]
     return Instants(float(gain.T) * (1 - q), q, np.zeros(q.size))
 
 
@@ -297,18 +304,3 @@ def _input(
     return eta**n * (
         np.einsum("im,kdim->kdm" if gains.ndim > 1 else "i,kdim->kdm", gains, eps) - np.einsum("i,kdim->kdm", own, y)
     )
-
-
-def _with_deadline(run: AgentsTrajectory, common: np.ndarray, h: np.ndarray, agreed: bool) -> AgentsTrajectory:
-    """Return the run with ``T`` itself, where deviations are 0; those of derivatives only if they agree."""
-    last = np.einsum("ij,kdj->kdi", _free_motion(run.protocol, np.array([1.0, _NEXT]))[-1], common)
-    if any(run.protocol.own):
-        last[:, :, 1:] = 0.0  # they rest
-    last[:, :, 0] += h
-    if not agreed:
-        last[:, :, 1:] = np.nan
-    gone = np.full(run.scaled.shape[:3], np.nan)
-    at_T: dict[str, Any] = {"t": [float(run.protocol.gain.T)], "remaining": [0.0], "clock": [np.inf]}
-    at_T |= {"states": last[..., None], "scaled": gone[..., None], "input": gone[:, :, 0, None]}
-    longer: dict[str, Any] = {name: np.concatenate([getattr(run, name), x], axis=-1) for name, x in at_T.items()}
-    return replace(run, **longer)

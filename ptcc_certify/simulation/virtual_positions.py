@@ -18,6 +18,7 @@ import numpy as np
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.simulation.agents import MOST_STATES, AgentsMotion, AgentsTrajectory, instants_left
+from ptcc_certify.simulation.instants import Instants
 from ptcc_certify.simulation.late_messages import simulate_late
 from ptcc_certify.simulation.nominal import sample
 from ptcc_certify.simulation.run import simulate
@@ -106,7 +107,9 @@ def simulate_vehicles(
     if 3 * graph.n_nodes > MOST_STATES:
         raise ParameterError(f"more than {MOST_STATES} numbers to integrate; simulate fewer agents")
     limited = GainLimits(gain_cap=protocol.gain_cap).limit(protocol.gain)
-    instants = instants_left(protocol.gain, remaining, samples, protocol.gain_cap)
+    instants = instants_left(protocol.gain, remaining, samples)
+    if protocol.gain_cap is None:  # at T itself the gain is infinite
+        instants = Instants(*(values[:-1] for values in instants))
     g = _gain_kept(limited, instants.t, instants.remaining)
     first = np.array([x0, np.asarray(v0, dtype=float) / g[0], x0], dtype=float).T
     states, _ = sample(_Tracking(graph, first, protocol, rtol), limited, instants)
