@@ -32,6 +32,18 @@ def round_to_bits(value: float, bits: int) -> Fraction:
     return Fraction(p, q) if drop <= 0 else Fraction(round(Fraction(p, 1 << drop)) << drop, q)
 
 
+def round_array(x: np.ndarray, bits: int = 40) -> np.ndarray:
+    """Round every float of an array to so many significant bits.
+
+    Examples
+    --------
+    >>> float(round_array(np.array([1 / 3]))[0]).hex()
+    '0x1.5555555556000p-2'
+    """
+    mantissa, exponent = np.frexp(x)
+    return np.ldexp(np.rint(np.ldexp(mantissa, bits)), exponent - bits)
+
+
 def dyadic_integers(values: Any) -> tuple[list[int], int]:
     """Return floats or ints as integers over one power of two: ``values = integers * 2^power``, exactly.
 

@@ -26,7 +26,7 @@ from lmi.errors import NoCertificate
 from lmi.search_time import checkpoint, part_of_time, share_of_time
 from ptcc_certify.checker.matrix_products import LARGEST_ROWS, WITH_MULTIPLIERS
 from ptcc_certify.graphs.size_limits import EXACT_NODES
-from ptcc_certify.lyapunov.common_forms import CommonForm, prove_ends, prove_mode, with_constants
+from ptcc_certify.lyapunov.common_forms import CommonForm, form_with_constants, prove_mode
 from ptcc_certify.lyapunov.common_left_vector import undirected_function
 from ptcc_certify.lyapunov.error_system import rounded_matrix
 from ptcc_certify.lyapunov.quotient import Quotient
@@ -209,9 +209,6 @@ def prove_certificate(
     P, top = certificate.matrix, float(np.abs(certificate.matrix).max())
     matrix = rounded_matrix(np.diag(np.diag(P)) if kind == "diagonal" else P, _MATRIX_BITS)
     unit = Fraction(2) ** (_MATRIX_BITS - math.ceil(math.log2(top)))
-    ends = prove_ends(matrix)
-    if ends is None:
-        return None
     rates: list[Fraction] = [Fraction(0)] * len(quotient.modes)
     multipliers: list[tuple[Fraction, ...]] = [()] * len(quotient.modes)
     for number, tau, guess in zip(moving, certificate.multipliers, certificate.rates, strict=True):
@@ -221,13 +218,4 @@ def prove_certificate(
         if rate is None:
             return None
         rates[number] = rate
-    function = CommonForm(
-        kind,
-        quotient,
-        matrix,
-        tuple(rates),
-        tuple(multipliers),
-        *ends,
-        numerical_rate=certificate.rate,
-    )
-    return with_constants(function)
+    return form_with_constants(kind, quotient, matrix, rates, multipliers)

@@ -41,7 +41,7 @@ class CommonForm:
     Attributes
     ----------
     kind : {"full", "diagonal", "undirected"}
-        ``undirected``: ``P`` is the square of the distance to the states at rest, weighted by ``left_vector``.
+        ``undirected``: ``P`` is the square of the distance to the states at rest, weighted by a common left vector.
     quotient : Quotient
         Its coordinates.
     matrix : n rows of n Fraction
@@ -53,17 +53,12 @@ class CommonForm:
         order; empty for the kind ``undirected``, of which the least weights are the worst.
     lowest, highest : Fraction
         ``lowest I <= P <= highest I``.
-    left_vector : tuple of N Fraction
-        Of the kind ``undirected``: ``p > 0`` with ``p' M(L) = 0`` for every member, ``M(L)`` with ``-|w|`` off the
-        diagonal.
     optimal : bool
         Whether no rate of any kind is larger: ``diag(p) L`` is symmetric in the slowest mode in which something moves.
     input_constants : tuple of N Fraction
         ``|(L X)_k|^2 <= input_constants[k] V`` for every member ``L``.
     coordinate_constants : tuple of n Fraction
         ``xi_k^2 <= coordinate_constants[k] V``.
-    numerical_rate : float or None
-        Of the search, before the matrix was rounded.
     means : tuple of WeightedMean
         Of leading groups: ``|q' L X|^2 <= constant V`` for every member.
     """
@@ -75,11 +70,9 @@ class CommonForm:
     multipliers: tuple[tuple[Fraction, ...], ...]
     lowest: Fraction
     highest: Fraction
-    left_vector: tuple[Fraction, ...] = ()
     optimal: bool = False
     input_constants: tuple[Fraction, ...] = ()
     coordinate_constants: tuple[Fraction, ...] = ()
-    numerical_rate: float | None = None
     means: tuple[WeightedMean, ...] = ()
 
     @property
@@ -222,8 +215,15 @@ def _roots(nodes: Iterable[int], constants: Sequence[Fraction]) -> Scaled:
     return dict(zip(nodes, values, strict=True)), Fraction(1, scale)
 
 
-def with_constants(function: CommonForm) -> CommonForm:
-    """Add the constants of inputs and coordinates; see :class:`CommonForm`.
+def form_with_constants(
+    kind: str,
+    quotient: Quotient,
+    matrix: Matrix,
+    rates: Sequence[Fraction],
+    multipliers: Sequence[tuple[Fraction, ...]],
+    optimal: bool = False,
+) -> CommonForm | None:
+    """Return a form of proved rates, with its ends, and the constants of inputs and coordinates; None if a proof fails.
 
     With ``y`` the row ``k`` of ``L_0 C^r`` and ``|z| = sqrt(z' P^-1 z)``, every member has
     ``|(L X)_k| <= (|y| + sum_e radius_e |effect_ek| |h_e|) sqrt(V)``.
@@ -232,7 +232,10 @@ def with_constants(function: CommonForm) -> CommonForm:
     ----------
     docs/theory/families.md, "Inputs".
     """
-    n, quotient = len(function.nodes), function.quotient
+    n = len(matrix)
+    if (ends := prove_ends(matrix)) is None:
+        return None
+    function = CommonForm(kind, quotient, matrix, tuple(rates), tuple(multipliers), *ends, optimal)
     vectors: dict[tuple[Fraction, ...], int] = {}
     for mode in quotient.modes:
         for row in (*mode.rows, *(part.h for part in mode.parts)):
@@ -240,7 +243,7 @@ def with_constants(function: CommonForm) -> CommonForm:
     units = [tuple(Fraction(int(i == j)) for j in range(n)) for i in range(n)]
     for unit in units:
         vectors.setdefault(unit, len(vectors))
-    squares = inverse_forms(function.matrix, list(vectors))
+    squares = inverse_forms(matrix, list(vectors))
     if squares is None:
         return function
     norms = [root_above(x) for x in squares]

@@ -24,7 +24,7 @@ import numpy as np
 from lmi.search_time import checkpoint
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.size_limits import EXACT_NODES
-from ptcc_certify.lyapunov.common_forms import CommonForm, prove_ends, prove_margin_about, with_constants
+from ptcc_certify.lyapunov.common_forms import CommonForm, form_with_constants, prove_margin_about
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.lemmas import solve_exact
 from ptcc_certify.theorems.matrix_arithmetic import Matrix
@@ -41,46 +41,30 @@ def undirected_function(quotient: Quotient) -> CommonForm | None:
     --------
     >>> path = Family.from_intervals([("a", "b", 1, 10), ("b", "c", 1, 10)], undirected=True)
     >>> V = undirected_function(Quotient(path))
-    >>> round(float(V.rate), 6), V.optimal, V.left_vector
-    (2.0, True, (Fraction(1, 1), Fraction(1, 1), Fraction(1, 1)))
+    >>> round(float(V.rate), 6), V.optimal
+    (2.0, True)
     """
     family = quotient.family
     p = common_left_vector(family)
     if p is None:
         return None
     P = _distance(quotient, p)
-    ends = prove_ends(P)
-    if ends is None:
-        return None
-    rates, symmetric, numerical = [], [], []
+    rates, symmetric = [], []
     for mode, own in zip(family.modes, quotient.modes, strict=True):
         checkpoint()
         L = mode.mandatory.exact_laplacian()
         S = [[p[i] * L[i][j] + p[j] * L[j][i] for j in quotient.nodes] for i in quotient.nodes]
-        guess = _least_eigenvalue(S, P)
-        rate = Fraction(0) if own.at_rest else prove_margin_about(S, P, guess, own.largest_entry)
+        rate = Fraction(0) if own.at_rest else prove_margin_about(S, P, _least_eigenvalue(S, P), own.largest_entry)
         if rate is None:
             return None
         rates.append(rate)
-        numerical.append(guess)
         nodes = range(family.n_nodes)
         symmetric.append(all(p[i] * L[i][j] == p[j] * L[j][i] for i in nodes for j in nodes if i < j))
     moving = [i for i, own in enumerate(quotient.modes) if not own.at_rest]
     if not moving:
         return None
     optimal = symmetric[min(moving, key=lambda i: rates[i])]
-    function = CommonForm(
-        "undirected",
-        quotient,
-        P,
-        tuple(rates),
-        ((),) * len(rates),
-        *ends,
-        left_vector=p,
-        optimal=optimal,
-        numerical_rate=min(numerical),
-    )
-    return with_constants(function)
+    return form_with_constants("undirected", quotient, P, rates, ((),) * len(rates), optimal)
 
 
 def common_left_vector(family: Family) -> Vector | None:

@@ -27,7 +27,7 @@ import numpy as np
 
 import lmi
 from lmi.definiteness_proofs import prove_generalized_margin
-from lmi.dyadic import round_to_bits
+from lmi.dyadic import round_array, round_to_bits
 from lmi.errors import LMIError, NoCertificate
 from lmi.sparse_definiteness_proofs import SparseDefinitenessProof, prove_sparse_positive_definite
 from lmi.sparse_h_matrix import FILL_ROWS, SparseHMatrix, fill_core
@@ -41,8 +41,6 @@ from ptcc_certify.theorems.matrix_arithmetic import diagonal_matrix, symmetric_p
 
 #: Relative deviations of ``t`` below the smallest eigenvalue: the larger, the smaller the overshoot constant.
 LOSSES = (1e-5, 1e-2, 0.1, 0.5, 0.9, 0.99, 1.0)
-#: Significant bits of weights and of the vector.
-_BITS = 40
 #: What floats may have lost in a row of the inequality: a share of the rate, and of the terms that cancel (45 units of
 #: rounding, enough for rows of hundreds of entries). No part of the proof: the check forms every row exactly and
 #: refuses a rate that is too large; this is the room for it to succeed.
@@ -171,18 +169,6 @@ class _Composite:
             bound = bound - w_F * (self.coupling @ d[:k])
             own = own - (self.coupling.T @ (w_F * d_F)) / (w[:k] * d[:k])
         return float(min((bound / (w_F * d_F)).min(), own.min(initial=np.inf)))
-
-
-def round_array(x: np.ndarray) -> np.ndarray:
-    """Round every entry to 40 significant bits.
-
-    Examples
-    --------
-    >>> float(round_array(np.array([1 / 3]))[0]).hex()
-    '0x1.5555555556000p-2'
-    """
-    mantissa, exponent = np.frexp(x)
-    return np.ldexp(np.rint(np.ldexp(mantissa, _BITS)), exponent - _BITS)
 
 
 def prove_group(graph: SignedDigraph, balanced: bool, search: int = 0) -> GroupProof:

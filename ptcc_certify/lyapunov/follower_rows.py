@@ -21,14 +21,13 @@ from typing import Any
 
 import numpy as np
 
-from lmi.dyadic import round_to_bits
+from lmi.dyadic import round_array, round_to_bits
 from lmi.errors import LMIError, NoCertificate
 from lmi.sparse_h_matrix import DIRECT_ROWS, positive_vector, smallest_eigenvalue
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.lyapunov.dominance import round_array
 from ptcc_certify.lyapunov.interval_rows import IntervalRows, Policy
 from ptcc_certify.model.refusals import refuse_leader_groups
 from ptcc_certify.theorems.family_behaviour import decide

@@ -26,7 +26,7 @@ from lmi.search_time import checkpoint
 from lmi.switched import SwitchedCertificate, switched_lyapunov
 from lmi.uncertain_matrix import UncertainMatrix
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.lyapunov.common_forms import CommonForm, prove_ends, prove_mode, with_constants
+from ptcc_certify.lyapunov.common_forms import CommonForm, form_with_constants, prove_ends, prove_mode
 from ptcc_certify.lyapunov.error_system import rounded_matrix
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.search_failures import failures_told
@@ -84,9 +84,10 @@ def mode_functions(quotient: Quotient, forms: ModeForms) -> list[CommonForm]:
     result = []
     parts = zip(quotient.family.modes, forms.matrices, forms.rates, forms.multipliers, strict=True)
     for mode, matrix, rate, multipliers in parts:
-        alone, ends = Quotient(Family((mode,)), quotient.kernel), prove_ends(matrix)
-        assert ends is not None, "the forms are proved definite"
-        result.append(with_constants(CommonForm("full", alone, matrix, (rate,), (multipliers,), *ends)))
+        alone = Quotient(Family((mode,)), quotient.kernel)
+        V = form_with_constants("full", alone, matrix, (rate,), (multipliers,))
+        assert V is not None, "the forms are proved definite"
+        result.append(V)
     return result
 
 

@@ -26,12 +26,11 @@ from typing import Any
 
 import numpy as np
 
-from lmi.dyadic import dyadic_array
+from lmi.dyadic import dyadic_array, round_array
 from lmi.exact.elementary_enclosures import rounded
 from lmi.sparse_h_matrix import positive_vector, smallest_eigenvalue
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import analyse, find_camps
-from ptcc_certify.lyapunov.dominance import round_array
 from ptcc_certify.lyapunov.interval_rows import IntervalRows, Policy, least_quotient
 from ptcc_certify.theorems.kernel import reached
 

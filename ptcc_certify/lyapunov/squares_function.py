@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from lmi.dyadic import dyadic_array, round_to_bits
+from lmi.dyadic import dyadic_array, round_array, round_to_bits
 from lmi.exact import arithmetic
 from lmi.exact.decimal_rounding import down
 from lmi.exact.definite import SparseFactor
@@ -40,7 +40,6 @@ from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.checker.weighted_squares import WeightedSquares
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.rationals import nearest_float
-from ptcc_certify.lyapunov.dominance import round_array
 from ptcc_certify.lyapunov.interval_rows import IntervalRows
 
 #: Values of ``t`` over the largest in-weight, and losses of the rate that are tried.

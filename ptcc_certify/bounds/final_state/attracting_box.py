@@ -28,7 +28,7 @@ from math import frexp
 
 import numpy as np
 
-from lmi.dyadic import dyadic_array
+from lmi.dyadic import dyadic_array, round_array
 from lmi.exact.numbers import integers
 from lmi.exact.work import WorkError
 from lmi.sparse_h_matrix import solve
@@ -36,7 +36,6 @@ from ptcc_certify.checker.constrained_switching import reachable_bounds
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.structure import find_camps
-from ptcc_certify.lyapunov.dominance import round_array
 from ptcc_certify.lyapunov.interval_rows import IntervalRows, Policy, least_quotient
 from ptcc_certify.lyapunov.row_decay import FollowerDecay, follower_decays, least_rate
 
