@@ -2,7 +2,7 @@
 
     OPENBLAS_NUM_THREADS=1 python benchmarks/definiteness.py [--real FOLDER]
 
-Dense matrices of 1,000 rows, matrices that dominate with 10^5 and 10^6 rows, and the largest strong component of
+Dense matrices of 1,000 rows, and the largest strong component of
 Bitcoin OTC (``soc-sign-bitcoinotc.csv.gz`` in FOLDER; skipped without it) as a graph of its own. ``prove`` finds a
 witness from floats, for which the kernel decides (:mod:`lmi.definiteness_proofs`); ``check`` hands it to the kernel
 alone, by the standard library or by its array twins (:mod:`lmi.exact`). The matrices ``P L + L' P - b P`` are exact:
@@ -103,37 +103,6 @@ def dense_cases() -> bool:
     return dense(f"dense {DENSE_ROWS}, P L + L'P - b I", hard, note) and good
 
 
-# ---------------------------------------------------------------------- dominance
-
-
-def dominant(rng: np.random.Generator, n: int) -> tuple[np.ndarray, ...]:
-    """Edges of the followers of a random graph of in-degree 7, and in-weights with a share from leaders."""
-    targets, sources = np.repeat(np.arange(n), IN_DEGREE), rng.integers(0, n, IN_DEGREE * n)
-    keep = np.zeros(len(targets), dtype=bool)
-    keep[np.unique(sources * n + targets, return_index=True)[1]] = True
-    keep &= sources != targets
-    sources, targets = sources[keep], targets[keep]
-    weights = rng.integers(1, 1000, len(sources)) * rng.choice([-1, 1], len(sources))
-    diagonal = rng.integers(1, 100, n)
-    np.add.at(diagonal, targets, np.abs(weights))
-    return sources, targets, weights, diagonal
-
-
-def dominance(n: int, goal: str) -> bool:
-    rng = np.random.default_rng(n)
-    sources, targets, weights, diagonal = dominant(rng, n)
-    off = sparse.csr_array((weights, (targets, sources)), shape=(n, n))
-    A = sparse.csr_array(off + sparse.csr_array((diagonal, (np.arange(n), np.arange(n))), shape=(n, n)))
-    u, v = np.ones(n), np.ones(n)
-    for _ in range(100):  # Jacobi steps towards M u = 1 and M' v = 1
-        u, v = (1 + abs(off) @ u) / diagonal, (1 + abs(off).T @ v) / diagonal
-    proof, prove = timed(lmi.prove_dominance, A, u, v)
-    if proof is None:
-        return report(f"dominance {n}", prove, None, goal, False)
-    note = f"{len(sources)} edges, b = {float(proof.rate):.6g}"
-    return report(f"dominance {n:.0e}", prove, None, goal, True, note)
-
-
 # ---------------------------------------------------------------------- a real core
 
 
@@ -185,8 +154,6 @@ def main() -> int:
     print(f"Python {platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}\n")
     print(f"{'seconds':<44} {'prove':>8} {'check':>8}  goal")
     holds = dense_cases()
-    holds &= dominance(10**5, "prove 2 s")
-    holds &= dominance(10**6, "prove 5 s")
     if options.real is None or not (options.real / BITCOIN).exists():
         print(f"Bitcoin OTC skipped: no {BITCOIN}, see --real")
     else:

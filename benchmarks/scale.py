@@ -146,7 +146,7 @@ def late(n: int, by_edge: bool) -> None:
     Of both also what theorem B2 alone takes: the search for witnesses, and the verification of their rows.
     """
     from ptcc_certify.checker import late_messages as verification
-    from ptcc_certify.lyapunov.late_follower_rows import FollowerRows
+    from ptcc_certify.lyapunov.follower_rows import FollowerRows
 
     witness = timed(FollowerRows, "witness")
     verified = timed(verification, "_check_rows")

@@ -23,8 +23,7 @@ _MODULES = {
     "schur_coupling": "Coupling RhoInterval couple_blocks schur_positive_definite",
     "definiteness_proofs": "DefinitenessProof ResidualWitness definite_by_polynomial "
     "no_diagonal_rate_above prove_generalized_margin prove_margin prove_positive_definite",
-    "sparse_definiteness_proofs": "DominanceProof SparseDefinitenessProof "
-    "prove_dominance prove_sparse_positive_definite",
+    "sparse_definiteness_proofs": "SparseDefinitenessProof prove_sparse_positive_definite",
     "dyadic": "dyadic_integers round_to_bits",
 }
 _EXPORTS = {name: f"lmi.{module}" for module, names in _MODULES.items() for name in names.split()}

@@ -1,4 +1,4 @@
-"""Proofs for sparse matrices: vectors of a matrix that dominates, and rounded sparse factors.
+"""Proofs for sparse matrices: rounded sparse factors.
 
 Floats propose the witness, the kernel decides (:mod:`lmi.exact`).
 """
@@ -6,7 +6,6 @@ Floats propose the witness, the kernel decides (:mod:`lmi.exact`).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -17,7 +16,6 @@ from lmi.dyadic import dyadic_array
 from lmi.errors import MatrixError
 from lmi.exact import fast
 from lmi.exact.definite import SparseFactor, scaled
-from lmi.exact.elementary_enclosures import rounded
 from lmi.sparse_h_matrix import diagonal_factor
 
 EPS = float(np.finfo(float).eps)
@@ -38,136 +36,6 @@ def _matrix(A: Any, name: str) -> sparse.csc_array:
     if not np.isfinite(A.data).all():
         raise MatrixError(f"{name} has an entry that is not finite")
     return A
-
-
-# ---------------------------------------------------------------------- dominance
-
-
-@dataclass(frozen=True, eq=False)
-class DominanceProof:
-    """Witness of :func:`prove_dominance`: ``Omega A + A' Omega >= rate Omega`` with ``Omega = diag(v / u)``.
-
-    Attributes
-    ----------
-    u, v : (n,) array of positive integers
-        int64, or Python integers where they are larger.
-    rate : Fraction
-        Positive, dyadic; per unit of the clock.
-
-    References
-    ----------
-    Berman and Plemmons, Nonnegative Matrices in the Mathematical Sciences, SIAM 1994, chapter 6.
-
-    Examples
-    --------
-    >>> proof = prove_dominance([[2.0, 1.0], [-1.0, 2.0]], [1, 1], [1, 1])
-    >>> bool((proof.u > 0).all() and (proof.v > 0).all()), proof.rate
-    (True, Fraction(2, 1))
-    """
-
-    u: np.ndarray
-    v: np.ndarray
-    rate: Fraction
-
-
-def prove_dominance(A: Any, u: Any, v: Any, *, bits: int = 22) -> DominanceProof | None:
-    """Find the largest rate that two positive vectors prove for a matrix that dominates, in integers.
-
-    With the comparison matrix ``M`` of ``A``, a positive diagonal, and positive ``u, v``, let ``b`` be the largest
-    number with ``v_i (M u)_i + u_i (M' v)_i >= b u_i v_i`` for all ``i``. The symmetric Z-matrix
-    ``Omega M + M' Omega - b Omega``, ``Omega = diag(v / u)``, takes ``u`` to a nonnegative vector, hence is positive
-    semidefinite, and ``x'(Omega A + A' Omega)x >= |x|'(Omega M + M' Omega)|x| >= b x' Omega x``.
-
-    Parameters
-    ----------
-    A : (n, n) array or sparse matrix of floats or ints
-        A float is the dyadic number that it is; a matrix of int64 likewise.
-    u, v : (n,) array
-        Positive; only their directions matter.
-    bits : int
-        ``u`` and ``v`` are rounded to this many significant bits before anything is proved.
-
-    Returns
-    -------
-    DominanceProof or None
-        ``rate`` is ``b`` of the rounded vectors, rounded down to 53 bits; None if that is not positive.
-
-    Raises
-    ------
-    MatrixError
-        ``A`` is not real, finite and square, or a vector is not positive, finite and of its length.
-
-    References
-    ----------
-    Berman and Plemmons, Nonnegative Matrices in the Mathematical Sciences, SIAM 1994, chapter 6.
-
-    Examples
-    --------
-    >>> proof = prove_dominance([[2.0, 1.0], [-1.0, 2.0]], [1, 1], [1, 1])
-    >>> proof.rate
-    Fraction(2, 1)
-    >>> prove_dominance([[1.0, 1.0], [-1.0, 1.0]], [1, 1], [1, 1]) is None
-    True
-    """
-    entries = sparse.coo_array(_matrix(A, "A"))
-    n = entries.shape[0]
-    u, v = _rounded_vector(u, n, bits), _rounded_vector(v, n, bits)
-    whole, power = dyadic_array(entries.data)
-    on = entries.row == entries.col
-    diagonal = np.zeros(n, dtype=whole.dtype)
-    diagonal[entries.row[on]] = whole[on]
-    edges = entries.col[~on], entries.row[~on], whole[~on]
-    rate = _largest_rate(edges, diagonal, u, v)
-    if rate is None or rate <= 0:
-        return None
-    return DominanceProof(u, v, rounded(rate, 53) * Fraction(2) ** power)
-
-
-def _largest_rate(edges: Any, diagonal: np.ndarray, u: np.ndarray, v: np.ndarray) -> Fraction | None:
-    """Return the least quotient of ``v_i (M u)_i + u_i (M' v)_i`` and ``u_i v_i``; None unless ``diagonal > 0``.
-
-    All in integers; ``edges`` are the columns, rows and values of the entries off the diagonal.
-    """
-    (sources, targets, weights), n = edges, len(diagonal)
-    if n == 0 or not (diagonal > 0).all():
-        return None
-    degree = max(int(np.bincount(ends, minlength=n).max()) for ends in (sources, targets))
-    weight, top, a, b = (max(int(x.max(initial=0)), -int(x.min(initial=0))) for x in (weights, diagonal, u, v))
-    # Neither the sums nor what is formed of them is larger than this in size.
-    sums, products = degree * weight * max(a, b), 2 * a * b * (top + degree * weight)
-    row_sums, column_sums = (np.zeros(n, dtype=_kind(sums)) for _ in range(2))
-    sizes = np.abs(weights.astype(row_sums.dtype))
-    np.add.at(row_sums, targets, sizes * u[sources])
-    np.add.at(column_sums, sources, sizes * v[targets])
-    row_sums, column_sums, diagonal, u, v = (x.astype(_kind(products)) for x in (row_sums, column_sums, diagonal, u, v))
-    x, y = 2 * diagonal * u * v - v * row_sums - u * column_sums, u * v
-    try:  # floats tell which rows may be the least
-        ratios = x.astype(float) / y.astype(float)
-        near = np.flatnonzero(~(ratios > ratios.min() + 2.0**-48 * abs(ratios.min())))
-    except OverflowError:
-        near = np.arange(n)
-    return min(map(Fraction, x[near].tolist(), y[near].tolist()))
-
-
-def _kind(size: int) -> Any:
-    """Return the type of array that holds integers of such a size."""
-    return np.int64 if size < fast.INT64_SAFE else object
-
-
-def _rounded_vector(x: Any, n: int, bits: int) -> np.ndarray:
-    """Return positive integers in the direction of ``x``, each rounded to about ``bits`` significant bits."""
-    x = np.asarray(x, dtype=float)
-    if x.shape != (n,) or not (np.isfinite(x).all() and (x > 0).all()):
-        raise MatrixError("a vector is not positive, finite and of the length of A")
-    mantissa, exponent = np.frexp(x)
-    whole = np.rint(np.ldexp(mantissa, bits)).astype(np.int64)
-    power = exponent - (exponent.min() if n else 0)
-    if power.max(initial=0) + bits < 62:
-        return whole << power
-    return whole.astype(object) << power.astype(object)
-
-
-# ---------------------------------------------------------------------- sparse factors
 
 
 class SparseDefinitenessProof(SparseFactor):

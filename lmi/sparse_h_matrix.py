@@ -62,19 +62,9 @@ class SparseHMatrix:
         NoCertificate
             No positive bound was found.
         """
-        y, low = np.ones(self.M.shape[0]), 0.0
-        factor = Factor(self.M) if y.size <= DIRECT_ROWS else None
-        for _ in range(_ROUNDS):
-            y = np.abs(solve(self.M, y, self.diagonal) if factor is None else factor.solve(y))
-            y /= y.max()
-            if not (y > 0).all():
-                break
-            before, low = low, max(low, float(((self.M @ y) / y).min()))
-            if low > 0 and low - before <= _GAIN * low:
-                break
-        if low <= 0:
+        if (smallest := smallest_eigenvalue(self.M)) is None:
             raise NoCertificate("the comparison matrix is not a nonsingular M-matrix that Krylov solves resolve")
-        return low
+        return smallest[0]
 
     def certificate(self, t: float) -> DiagonalCertificate:
         """Return the certificate of ``u = (M - t I)^-1 1`` and ``v``; its witness is ``(u, v)``.
@@ -84,14 +74,7 @@ class SparseHMatrix:
         NoCertificate
             ``t`` is too near to the smallest eigenvalue, or beyond it.
         """
-        ones, shift = np.ones(self.M.shape[0]), self.diagonal - t
-        loose = _WITNESS_RESIDUAL / np.sqrt(ones.size)
-        u, v = (
-            solve(
-                B - t * sparse.eye_array(ones.size, format="csr"), ones, np.maximum(shift, self.diagonal * 1e-3), loose
-            )
-            for B in (self.M, self.Mt)
-        )
+        u, v = positive_vector(self.M, t), positive_vector(self.Mt, t)
         if not ((u > 0).all() and (v > 0).all()):
             raise NoCertificate(f"no positive witness at {t:.6g}")
         rate = float(((self.M @ u) / u).min() + ((self.Mt @ v) / v).min())
@@ -99,6 +82,71 @@ class SparseHMatrix:
             raise NoCertificate(f"the witness at {t:.6g} proves no positive rate")
         log_omega = np.log(v) - np.log(u)
         return DiagonalCertificate(log_omega - log_omega.max(), rate, witness=(u, v))
+
+
+def smallest_eigenvalue(
+    M: Any, shifted: bool = False, rounds: int = _ROUNDS, residual: float = _RESIDUAL
+) -> tuple[float, np.ndarray] | None:
+    """Bound the smallest eigenvalue of an M-matrix from below, ``min_i (M y)_i / y_i``, by inverse iteration.
+
+    Parameters
+    ----------
+    M : (n, n) sparse array
+    shifted : bool
+        Whether, up to ``DIRECT_ROWS`` rows, the bound shifts the next solve (Noda's iteration).
+    rounds : int
+        Solves at most.
+    residual : float
+        Of a solve of more rows.
+
+    Returns
+    -------
+    (float, (n,) array) or None
+        The bound and its ``y``; None if no positive bound is found.
+
+    Examples
+    --------
+    >>> round(smallest_eigenvalue(sparse.csr_array([[2.0, -1.0], [-1.0, 2.0]]))[0], 6)
+    1.0
+    """
+    diagonal, n = M.diagonal(), M.shape[0]
+    if not (diagonal > 0).all():
+        return None
+    factor = Factor(M) if n <= DIRECT_ROWS and not shifted else None
+    y, best, low = np.ones(n), np.ones(n), 0.0
+    for _ in range(rounds):
+        try:
+            if factor is not None:
+                y = factor.solve(y)
+            elif n <= DIRECT_ROWS:
+                y = diagonal_factor(M - low * (1 - _GAIN) * sparse.eye_array(n, format="csr")).solve(y)
+            else:
+                y = solve(M, y, diagonal, residual)
+        except RuntimeError:  # exactly singular
+            break
+        y = np.abs(y) / np.abs(y).max()
+        if not (y > 0).all():
+            break
+        before, bound = low, float(((M @ y) / y).min())
+        if bound > low:
+            low, best = bound, y
+        if low > 0 and low - before <= _GAIN * low:
+            break
+    return (low, best) if low > 0 else None
+
+
+def positive_vector(M: Any, t: float) -> np.ndarray:
+    """Return ``(M - t I)^-1 1``, positive for ``t`` below the smallest eigenvalue, as near as a witness needs.
+
+    Examples
+    --------
+    >>> positive_vector(sparse.csr_array([[2.0, -1.0], [-1.0, 2.0]]), 0.5).round(6)
+    array([2., 2.])
+    """
+    diagonal, ones = M.diagonal(), np.ones(M.shape[0])
+    shifted = M - t * sparse.eye_array(ones.size, format="csr")
+    room = np.maximum(diagonal - t, diagonal * 1e-3 + 1e-300)
+    return solve(shifted, ones, room, _WITNESS_RESIDUAL / np.sqrt(ones.size))
 
 
 def solve(B: Any, right: np.ndarray, diagonal: np.ndarray, tolerance: float = _RESIDUAL) -> np.ndarray:

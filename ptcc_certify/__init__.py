@@ -95,7 +95,7 @@ _EXPORTS = {
     "ellipsoid": "bounds.input.initial_sets",
     "worst_initial_state": "bounds.input.worst_initial_state",
     "design": "gain_design.search",
-    "design_agents": "gain_design.agents_shortest_deadline",
+    "design_agents": "gain_design.deadline_search",
     # Many graphs
     "Ensemble": "graphs.ensembles",
     "certify_many": "batch",

@@ -45,7 +45,7 @@ IN_ROOMS = {
         "containment_weights",
         "exact_containment_weights",
     ),
-    "theorems.casadi_lyapunov": ("SymbolicLyapunov", "symbolic_lyapunov", "SymbolicSliding", "symbolic_sliding"),
+    "theorems.casadi_lyapunov": ("SymbolicLyapunov", "symbolic_lyapunov"),
     "model.gain": ("Gain", "prescribed_time_bound"),
     "model.disturbance": ("WorstCaseDisturbance",),
     "model.reaching_time": ("ReachingTime", "certified_reaching_times"),

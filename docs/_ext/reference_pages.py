@@ -36,7 +36,7 @@ ROOMS = {
     ),
     "gain_design": (
         "Design of gains and deadlines",
-        "gain_design.answer gain_design.search gain_design.agents_answer gain_design.agents_shortest_deadline",
+        "gain_design.answer gain_design.search gain_design.deadline_search",
     ),
     "batch": ("Many graphs", "batch"),
     "report": ("Pages, statements, figures", "report.explorer"),

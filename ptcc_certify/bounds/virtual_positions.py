@@ -26,7 +26,7 @@ from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.stated_bounds import Decay, VehiclesSection, coefficients
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.lyapunov.late_follower_rows import FollowerRows
+from ptcc_certify.lyapunov.follower_rows import FollowerRows
 
 #: How many times faster vehicles track than the virtual states decay.
 FASTER = 2

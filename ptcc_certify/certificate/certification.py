@@ -7,6 +7,7 @@ the check; a simulation corroborates and never proves.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -23,9 +24,8 @@ from ptcc_certify.certificate.graph_certification import (
     STEPS,
     GraphSteps,
     with_agents,
-    with_small_delays,
-    with_word_of_check,
 )
+from ptcc_certify.certificate.messages_part import with_messages
 from ptcc_certify.certificate.request import (
     Question,
     listener,
@@ -44,7 +44,7 @@ from ptcc_certify.graphs.size_limits import (
     ONE_THREAD_NODES,
 )
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.lyapunov.late_follower_rows import refuse_other_targets
+from ptcc_certify.lyapunov.follower_rows import refuse_other_targets
 from ptcc_certify.model import Protocol
 from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.asks import Asks
@@ -172,12 +172,15 @@ def certify_case(
     Certificate
     """
     origins = origins_of(case.graph, case.initial) | dict(origins or {})
-    case = with_vehicles(case.with_plain_agents()).with_rows()
+    of_family = bool(case.uncertainty or is_family(case.graph))
+    case = with_vehicles(case.with_plain_agents()).with_rows(of_family)
     _refuse_before_reading(case)
-    progress, family = listener(progress), _read_family(case)
+    progress, family = listener(progress), _read_family(case) if of_family else None
     graph = as_graph(case.graph) if family is None else family.modes[0].mandatory
     refuse_before_the_graph(case)
     if family is None:
+        if case.signal != "any":
+            raise ParameterError("signal is for families of graphs, which change; this is one graph: leave it out")
         refuse_long_weights(graph)
     else:
         refuse_signals(family, case)
@@ -196,28 +199,40 @@ def certify_case(
     x0 = None if chains else case.initial.x0
     state = None if x0 is None else read_initial_state(structure, x0, "x0")
     manifold, reaching = read_sliding_variable(structure, case.protocol, case.initial.sigma0)
+    if case.messages is not None and any(manifold or ()):
+        raise ParameterError("sigma0", "late messages ask for 0, so that no sliding variable moves; leave it out")
     question = Question(structure if family is None else family, case.protocol, state, manifold, request)
     with one_thread(graph.n_nodes <= ONE_THREAD_NODES):
         if family is not None:
-            return certify_family(family, question, reaching, progress)
-        steps = GraphSteps(structure, question, progress)
-        wanted = steps.needs_run(case.asks.simulation)
-        certificate = steps.certificate(case.asks.disturbance, wanted and state is not None, reaching)
-        if formation is not None:
-            certificate = certificate.changed(offsets=formation.offsets)
-        if agents is not None and chains is not None:
-            certificate = with_agents(certificate, agents, chains, wanted)
-        certificate = with_small_delays(certificate)
+            certificate = certify_family(family, question, reaching, progress)
+        else:
+            steps = GraphSteps(structure, question, progress)
+            wanted = steps.needs_run(case.asks.simulation)
+            certificate = steps.certificate(case.asks.disturbance, wanted and state is not None, reaching)
+            if formation is not None:
+                certificate = certificate.changed(offsets=formation.offsets)
+            if agents is not None and chains is not None:
+                certificate = with_agents(certificate, agents, chains, wanted)
+        certificate = with_messages(certificate)
         progress(STEPS[5])
         return with_word_of_check(certificate)
 
 
-def _read_family(case: Case) -> Family | None:
-    """Return the family that is asked about, or refuse what it does not take; None for one graph."""
-    if not (case.uncertainty or is_family(case.graph)):
-        if case.signal != "any":
-            raise ParameterError("signal is for families of graphs, which change; this is one graph: leave it out")
-        return None
+def with_word_of_check(certificate: Certificate) -> Certificate:
+    """Check a certificate, and note what the check has to say besides."""
+    if (report := certificate.checked) is None:
+        return certificate  # nothing is decided that a file could hold
+    if report.accepted and report.memory > 1:
+        note = f"the check of this certificate needs more than 1 GB: allow {math.ceil(report.memory)} GB of memory"
+        return certificate.changed(notes=(*certificate.observed.notes, note))
+    if not report.accepted:
+        note = f"the independent check does not accept {report.rejected}: {report.reason}"
+        return certificate.changed(notes=(note, *certificate.observed.notes))
+    return certificate
+
+
+def _read_family(case: Case) -> Family:
+    """Return the family that is asked about, or refuse what it does not take."""
     refuse_of_families(case)
     family = as_family(case.graph, uncertainty=case.uncertainty)
     if case.messages is not None or case.leaders is not None:

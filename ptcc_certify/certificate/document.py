@@ -56,8 +56,8 @@ from ptcc_certify.checker.signal_bounds import FamilyInput
 from ptcc_certify.checker.theorem_function import PaperSection
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.lyapunov.follower_rows import listeners
 from ptcc_certify.lyapunov.function import Dominance
-from ptcc_certify.lyapunov.late_follower_rows import listeners
 from ptcc_certify.model import Protocol
 from ptcc_certify.model.reaching_time import ReachingTime
 from ptcc_certify.theorems.theorem import Obligation

@@ -8,15 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 
 from lmi import search_time as deadline
 from lmi.exact.decimal_rounding import counted
 from lmi.search_time import share_of_time
-from ptcc_certify.bounds.delay.case import LateCase
-from ptcc_certify.bounds.delay.late_messages import bound_late
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.bounds.final_state.attracting_box import AttractingBox, box_of_family
 from ptcc_certify.bounds.final_state.kept_means import with_means
@@ -38,11 +35,11 @@ from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
 from ptcc_certify.lyapunov.aimed_forms import Aim, aimed_functions
-from ptcc_certify.lyapunov.family_function import FamilyFunction
-from ptcc_certify.lyapunov.family_rate_upper_bound import prove_family_rate_bound
-from ptcc_certify.lyapunov.family_search import CLOSED_ROWS, FULL_ROWS, FamilySearch, search_family
+from ptcc_certify.lyapunov.common_form_search import CLOSED_ROWS, FULL_ROWS, FamilySearch, search_common_forms
+from ptcc_certify.lyapunov.common_forms import CommonForm
 from ptcc_certify.lyapunov.follower_function import follower_functions
 from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.slow_signals import prove_signal_rate_bound
 from ptcc_certify.lyapunov.squares_function import SquaresFunction, squares_function
 from ptcc_certify.model import Protocol
 from ptcc_certify.model.case import Case
@@ -98,12 +95,6 @@ def certify_family(
     progress : callable
         Is told each of :data:`STEPS` as it begins.
 
-    Raises
-    ------
-    ParameterError
-        Sliding variables move where messages are late, or leaders move.
-    HypothesisError
-        Where followers are drawn to depends on the signal, or leaders hear somebody in some mode, in such a case.
     """
     progress(STEPS[0])
     components, request = decide(family), question.request
@@ -126,24 +117,8 @@ def certify_family(
                 request.signal, parts, question.protocol, begin, notes, request.expectations.min_rate
             ),
         )
-    progress(STEPS[-1])
     notes = [f"{note}: cut off by the time limit" if note in (*STEPS, BOXES) else note for note in notes]
-    certificate = _fewer_functions(Certificate(proof, Observations(notes=tuple(dict.fromkeys(notes)))))
-    beside = _beside(certificate.family_proof)
-    return certificate.changed(**beside) if beside else certificate
-
-
-def _beside(proof: FamilyProof) -> dict[str, Any]:
-    """Return what is proved for every signal where messages are late, or leaders move."""
-    messages, state = proof.request.messages, proof.initial_state
-    if messages is None:
-        return {}
-    if not proof.direct:
-        raise ParameterError("sigma0", "late messages ask for 0, so that no sliding variable moves; leave it out")
-    known = [pair for pair in proof.final_state or () if pair is not None]
-    middles = [((low + high) / 2, (high - low) / 2) for low, high in known]
-    ends = middles if len(known) == proof.family.n_nodes else None
-    return {"late": bound_late(LateCase(proof.family, proof.protocol, messages, state, ends, proof.request.leaders))}
+    return _fewer_functions(Certificate(proof, Observations(notes=tuple(dict.fromkeys(notes)))))
 
 
 def _fewer_functions(certificate: Certificate) -> Certificate:
@@ -151,20 +126,21 @@ def _fewer_functions(certificate: Certificate) -> Certificate:
 
     Claims for restricted signals that rest on a function left out are left out with it.
     """
-    parts = certificate.family_proof.parts
-    functions = [(part, V) for part in parts for V in part.functions if isinstance(V, FamilyFunction)]
+    proof = certificate.family_proof
+    parts = proof.parts
+    functions = [(part, V) for part in parts for V in part.functions if isinstance(V, CommonForm)]
     work = sum((len(V.nodes) + len(tau)) ** 3 for _, V in functions for tau in V.multipliers)
     few = sum(len(part.functions) for part in parts) <= MANY_FUNCTIONS
-    if (few and work <= LARGEST_ROWS**3) or not certificate.proof.checkable:
+    if (few and work <= LARGEST_ROWS**3) or not proof.checkable:
         return certificate
     for most in (1, 0):
         report = certificate.checked
         if report is None or report.accepted:
             break
         note = f"the independent check does not take all functions that were found: {report.reason}"
-        claims = certificate.family_proof.restricted
+        claims = proof.restricted
         certificate = certificate.changed(
-            parts=tuple(replace(part, functions=part.functions[:most]) for part in certificate.family_proof.parts),
+            parts=tuple(replace(part, functions=part.functions[:most]) for part in parts),
             restricted=tuple(c for c in claims if most or not (isinstance(c, RateClaim) and c.forms is None)),
             notes=tuple(dict.fromkeys((*certificate.observed.notes, note))),
         )
@@ -203,12 +179,8 @@ def _with_means(part: ComponentProof) -> ComponentProof:
     """Add weighted means to the functions, where groups of leaders keep none exactly."""
     if all(group.vector is not None for group in part.leading_groups):
         return part
-    forms = {k: V for k, V in enumerate(part.functions) if isinstance(V, FamilyFunction)}
-    quotient = Quotient.of(part.component) if forms else None
-    functions = list(part.functions)
-    for k, V in forms.items():
-        assert quotient is not None
-        functions[k] = with_means(V, quotient, part.leading_groups)
+    groups = part.leading_groups
+    functions = (with_means(V, groups) if isinstance(V, CommonForm) else V for V in part.functions)
     return replace(part, functions=tuple(functions))
 
 
@@ -224,7 +196,7 @@ def _dense(component: FamilyComponent, notes: list[str]) -> tuple[ProvedFunction
     """Return a dense form of a component of some hundreds of agents, if one is proved."""
     if component.nodes.size > CLOSED_ROWS or component.behaviour not in (STABILITY, BIPARTITE_CONSENSUS):
         return ()
-    search = search_family(Quotient.of(component), ["full"])
+    search = search_common_forms(Quotient.of(component), ["full"])
     notes += search.notes
     return search.functions
 
@@ -261,7 +233,7 @@ def _prove(
     bound, search = None, FamilySearch()
     progress(STEPS[1])
     with share_of_time(_BOUND_SHARE, STEPS[1], notes):
-        bound = prove_family_rate_bound(quotient)
+        bound = prove_signal_rate_bound(quotient)
     progress(STEPS[2])
     squares: list[SquaresFunction] = []
     aimed: list[ProvedFunction] = []
@@ -269,14 +241,14 @@ def _prove(
     with share_of_time(1.0, STEPS[2], notes):
         squares = _squares(component)  # which takes no time to speak of
         enough = None if bound is None else _ENOUGH * bound.value
-        search = search_family(quotient, enough=enough, slower=aim is None)
+        search = search_common_forms(quotient, enough=enough, slower=aim is None)
         for V in () if aim is None else aimed_functions(quotient, aim, search.functions, notes):
             aimed.append(V)  # kept, whatever comes after
     notes += [*search.notes, *(f"{name}: cut off by the time limit" for name in search.cut_off)]
     rate = max((V.rate for V in search.functions), default=Fraction(0))
     if bound is not None and search.functions and rate < _ENOUGH * bound.value:
         with share_of_time(1.0, STEPS[1], notes):  # signals played against what was found
-            again = prove_family_rate_bound(quotient, search.functions)
+            again = prove_signal_rate_bound(quotient, search.functions)
             bound = bound if again is None else min(bound, again, key=lambda b: b.value)
     better = [V for V in squares if _ENOUGH * V.rate > rate]
     functions = sorted((*search.functions, *aimed), key=lambda V: -V.rate)

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from lmi.exact.numbers import integers
 from ptcc_certify.bounds.deviation.component_deviations import FunctionOf, UndrivenPart
 from ptcc_certify.bounds.deviation.heard import HeardRows
 from ptcc_certify.bounds.deviation.of_family import (
@@ -37,9 +36,7 @@ from ptcc_certify.certificate.constrained_switching.claims import (
 )
 from ptcc_certify.certificate.functions import ProvedFunction
 from ptcc_certify.certificate.proof import Proof
-from ptcc_certify.checker.common_forms import Scaled
-from ptcc_certify.checker.common_kernel_ends import WeightedMean, agents_heard, limits
-from ptcc_certify.checker.input_formulas import root_above
+from ptcc_certify.checker.common_kernel_ends import agents_heard, limits
 from ptcc_certify.checker.protocol import last_time, sliding_bounded, sliding_part
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.checker.signal_bounds import Drive, deviations, ends_near, peaks
@@ -47,11 +44,9 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.structure import STABILITY
-from ptcc_certify.lyapunov.family_function import FamilyFunction
-from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound
 from ptcc_certify.lyapunov.follower_function import FollowerFunction
 from ptcc_certify.lyapunov.quotient import Quotient
-from ptcc_certify.lyapunov.squares_function import SquaresFunction
+from ptcc_certify.lyapunov.slow_signals import SignalRateBound
 from ptcc_certify.model.constrained_switching import SignalClass
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 from ptcc_certify.theorems.family_kernel import UNKNOWN
@@ -64,15 +59,15 @@ class ComponentProof:
     Attributes
     ----------
     component : FamilyComponent
-    functions : tuple of FamilyFunction, FollowerFunction or SquaresFunction
+    functions : tuple of CommonForm, FollowerFunction or SquaresFunction
         Proved, the largest rate first; nodes are numbered within the component.
-    upper_bound : FamilyRateBound or None
+    upper_bound : SignalRateBound or None
         No rate for every signal is larger.
     """
 
     component: FamilyComponent
     functions: tuple[ProvedFunction, ...] = ()
-    upper_bound: FamilyRateBound | None = None
+    upper_bound: SignalRateBound | None = None
 
     @property
     def rate(self) -> Fraction | None:
@@ -111,52 +106,6 @@ class ComponentProof:
             else:
                 rows[v] = {abs(code) - 1: Fraction(1 if code > 0 else -1)} if code else {}
         return rows
-
-
-@dataclass(frozen=True)
-class BoundFunction:
-    """A function of a component as the formulas of the bounds take it: by nodes of the component."""
-
-    quotient: Quotient
-    function: FamilyFunction
-
-    @property
-    def rate(self) -> Fraction:
-        """The rate for every signal."""
-        return self.function.rate
-
-    @property
-    def speeds(self) -> list[Scaled]:
-        """Bounds of ``|(L X)_k| / sqrt(V)``."""
-        return [self.function.speeds]
-
-    @property
-    def sizes(self) -> list[Scaled]:
-        """Bounds of ``|xi_k| / sqrt(V)``."""
-        (roots,), scale = integers([[root_above(c) for c in self.function.coordinate_constants]])
-        return [(dict(zip(self.function.nodes, roots, strict=True)), Fraction(1, scale))]
-
-    @property
-    def means(self) -> list[WeightedMean]:
-        """Weighted means of leading groups, with their constants."""
-        codes, result = self.quotient.kernel.codes, []
-        for q, constant in self.function.means:
-            weights = {v: w for v, w in enumerate(q) if w}
-            signs = {v: int(codes[v]) for v in weights}
-            size = sum((w if signs[v] > 0 else -w for v, w in weights.items()), Fraction(0))
-            result.append(WeightedMean(abs(signs[min(signs)]) - 1, weights, size, constant))
-        return result
-
-    def root(self, x: Sequence[Fraction]) -> Fraction:
-        """Bound ``sqrt(V)`` of a state of the component."""
-        return root_above(self.function.value(self.quotient.coordinates(x)))
-
-    def largest(self, sizes: Mapping[int, Fraction]) -> Fraction:
-        """Bound ``V`` of all states with ``|x_k| <= sizes_k``."""
-        return self.function.largest(self.quotient.coordinate_sizes(sizes))
-
-
-AnyBoundFunction = BoundFunction | FollowerFunction | SquaresFunction
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -338,20 +287,14 @@ class FamilyProof(Proof):
         return tuple(own.constant(V) for functions, own in pairs if own is not None for V in functions)
 
     @property
-    def _driven_parts(self) -> Iterator[tuple[ComponentProof, Sequence[AnyBoundFunction], Drive | None]]:
+    def _driven_parts(self) -> Iterator[tuple[ComponentProof, Sequence[ProvedFunction], Drive | None]]:
         """Of every part its functions, and what sliding variables do to it."""
         return zip(self.parts, self.bound_functions, self._drives, strict=True)
 
     @cached_property
-    def bound_functions(self) -> tuple[tuple[AnyBoundFunction, ...], ...]:
-        """The functions of every part, as the formulas of the bounds take them."""
-        return tuple(
-            tuple(
-                BoundFunction(Quotient.of(part.component), V) if isinstance(V, FamilyFunction) else V
-                for V in part.functions
-            )
-            for part in self.parts
-        )
+    def bound_functions(self) -> tuple[tuple[ProvedFunction, ...], ...]:
+        """The functions of every part."""
+        return tuple(part.functions for part in self.parts)
 
     @cached_property
     def final_state(self) -> FinalEnds | None:
@@ -378,7 +321,7 @@ class FamilyProof(Proof):
         return [self.nominal_state[v] for v in part.component.nodes.tolist()]
 
     def _final(
-        self, part: ComponentProof, functions: Sequence[AnyBoundFunction], driven: Drive | None
+        self, part: ComponentProof, functions: Sequence[ProvedFunction], driven: Drive | None
     ) -> Mapping[int, Interval | None]:
         component, x = part.component, self._state(part)
         n = len(x)
@@ -510,7 +453,7 @@ class FamilyProof(Proof):
                     bounds[nodes] = np.minimum(bounds[nodes], deviation)
         return bounds
 
-    def _undriven(self, part: ComponentProof, functions: Sequence[AnyBoundFunction]) -> UndrivenPart:
+    def _undriven(self, part: ComponentProof, functions: Sequence[ProvedFunction]) -> UndrivenPart:
         """Return a component with its functions, those of parts that others follow included."""
         rows = HeardRows.of(part.component.family)
         finals = (
@@ -521,7 +464,7 @@ class FamilyProof(Proof):
         everybody = np.arange(part.component.nodes.size)
         own = [FunctionOf(everybody, V, part.rest_states) for V in functions]
         for led in (led for V in functions if isinstance(V, FollowerFunction) for led in V.parts):
-            own.append(FunctionOf(led.agents, BoundFunction(led.quotient, led.function), _rest_states(led.quotient)))
+            own.append(FunctionOf(led.agents, led.function, _rest_states(led.function.quotient)))
         return UndrivenPart(own, self._state(part), rows, known if len(known) == everybody.size else None)
 
     def norm_bound(self, V: Any, part: int, remaining: Sequence[float] | np.ndarray) -> np.ndarray:

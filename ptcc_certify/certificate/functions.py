@@ -27,12 +27,12 @@ from ptcc_certify.checker.weighted_squares import FactorWitness, SquaresSection
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends
-from ptcc_certify.lyapunov.family_rows import FollowerDecay
+from ptcc_certify.lyapunov.common_forms import CommonForm, prove_ends, weighted_mean
 from ptcc_certify.lyapunov.follower_function import FollowerFunction, LeadingPart
 from ptcc_certify.lyapunov.function import DeviationBound, Dominance, LyapunovBlock, LyapunovFunction
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.rate_upper_bound import RateBound
+from ptcc_certify.lyapunov.row_decay import FollowerDecay
 from ptcc_certify.lyapunov.squares_function import FormTable, SquaresFunction
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
 from ptcc_certify.theorems.theorem import Obligation
@@ -51,13 +51,13 @@ def function_section(
     if isinstance(V, SquaresFunction):
         return SquaresSection(class_="squares", component=number, vector=V.vector, rate=V.rate)
     nodes = component.nodes
-    if isinstance(V, FamilyFunction):
+    if isinstance(V, CommonForm):
         return _form(nodes, component.family.labels, number, V)
     parts = [_part(nodes, component.family.labels, number, part) for part in V.parts]
     return RowsSection(class_="rows", component=number, vector=_vector(V.vector, out), parts=parts, rate=V.rate)
 
 
-def _form(nodes: np.ndarray, labels: Sequence[str], number: int, V: FamilyFunction) -> FormSection:
+def _form(nodes: np.ndarray, labels: Sequence[str], number: int, V: CommonForm) -> FormSection:
     """Return a quadratic form of some agents, which have these places and labels."""
     kind: Any = V.kind
     return FormSection(
@@ -69,8 +69,8 @@ def _form(nodes: np.ndarray, labels: Sequence[str], number: int, V: FamilyFuncti
         inputs=dict(zip(labels, V.input_constants, strict=True)),
         coordinates=dict(zip([labels[v] for v in V.nodes], V.coordinate_constants, strict=True)),
         means=[
-            MeanSection(weights={label: w for label, w in zip(labels, q, strict=True) if w}, constant=constant)
-            for q, constant in V.means
+            MeanSection(weights={labels[v]: w for v, w in mean.weights.items()}, constant=mean.constant)
+            for mean in V.means
         ],
     )
 
@@ -119,7 +119,7 @@ def read_box(entry: attracting_boxes.AttractingBox, labels: Sequence[str], files
 
 def function_steps(of: str, V: ProvedFunction, out: Writer) -> Iterator[Obligation]:
     """Yield the obligations of a Lyapunov function: of its modes, or of its parts, then of its rows."""
-    if isinstance(V, FamilyFunction):
+    if isinstance(V, CommonForm):
         for mode, rate in enumerate(V.rates):
             witness = Multipliers(multipliers=V.multipliers[mode] if V.multipliers else ())
             told = None if V.kind == "undirected" else witness
@@ -149,19 +149,18 @@ def read_function(
         return SquaresFunction(dict(enumerate(own)), scale, section.rate, tables)
     if isinstance(section, RowsSection):
         return _read_rows(of, section, component, proved, files)
-    return _read_form(of, section, component.family.labels, proved)
+    return _read_form(of, section, Quotient.of(component), proved)
 
 
-def _read_form(of: str, section: FormSection, labels: Sequence[str], proved: Proved) -> FamilyFunction:
-    index = {label: v for v, label in enumerate(labels)}
-    nodes, matrix = tuple(index[label] for label in section.nodes), list(map(list, section.lower_triangle))
+def _read_form(of: str, section: FormSection, quotient: Quotient, proved: Proved) -> CommonForm:
+    index = {label: v for v, label in enumerate(quotient.family.labels)}
+    matrix = list(map(list, section.lower_triangle))
     steps = rates_of(of, proved)
     ends = prove_ends(matrix)
     assert ends is not None, "the check has proved it definite"
-    return FamilyFunction(
+    return CommonForm(
         section.class_,
-        tuple(v for v in range(len(labels)) if v not in set(nodes)),
-        nodes,
+        quotient,
         matrix,
         tuple(step["b"] for step in steps),
         tuple(tuple(step["witness"].multipliers) for step in steps if step["witness"] is not None),
@@ -169,7 +168,8 @@ def _read_form(of: str, section: FormSection, labels: Sequence[str], proved: Pro
         input_constants=tuple(section.inputs.values()),
         coordinate_constants=tuple(section.coordinates.values()),
         means=tuple(
-            (tuple(mean.weights.get(label, Fraction(0)) for label in labels), mean.constant) for mean in section.means
+            weighted_mean(quotient, {index[label]: w for label, w in mean.weights.items()}, mean.constant)
+            for mean in section.means
         ),
     )
 
@@ -196,8 +196,8 @@ def _read_rows(
     ends, parts = dict.fromkeys(outside, 0), []
     for j, (some, part) in enumerate(zip(agents, section.parts, strict=True)):
         own = family.restricted(some)
-        function = _read_form(f"{of}.parts[{j}]", part.function, own.labels, proved)
-        parts.append(LeadingPart(some, Quotient(own), function, part.times * scale))
+        function = _read_form(f"{of}.parts[{j}]", part.function, Quotient(own), proved)
+        parts.append(LeadingPart(some, function, part.times * scale))
         bounds = zip(some.tolist(), part.bounds, strict=True)
         ends |= {v: ceil(bound * scale) for v, bound in bounds if v not in pivots}
     vectors = np.array(d, dtype=object), np.array(list(ends.values()), dtype=object)
@@ -340,4 +340,4 @@ def factor_section(factor: SparseFactor, power: int, parents: np.ndarray | None 
     )
 
 
-ProvedFunction = FamilyFunction | FollowerFunction | SquaresFunction
+ProvedFunction = CommonForm | FollowerFunction | SquaresFunction

@@ -15,11 +15,7 @@ from lmi import search_time as deadline
 from lmi.child_process import apart
 from lmi.errors import LMIError, NoCertificate, OutOfTime
 from lmi.search_time import share_of_time
-from ptcc_certify.bounds.delay.case import LateCase
-from ptcc_certify.bounds.delay.late_messages import LateBounds, bound_late
-from ptcc_certify.bounds.delay.longest_delay import longest_delay, longest_forgiven, with_forms
 from ptcc_certify.bounds.envelope import FRACTIONS
-from ptcc_certify.bounds.final_state.enclosed_ends import Interval
 from ptcc_certify.bounds.final_state.of_graph import (
     FinalState,
     Influence,
@@ -35,15 +31,13 @@ from ptcc_certify.certificate.agents_part import AgentsPart, prove_agents, with_
 from ptcc_certify.certificate.agents_request import (
     Chains,
 )
-from ptcc_certify.certificate.assessment import rejects
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.evidence import Observations
-from ptcc_certify.certificate.final_state_sections import stated_ends
 from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.certificate.proof import OfQuestion
 from ptcc_certify.certificate.request import Question
 from ptcc_certify.certificate.verdict import MANY_DECADES
-from ptcc_certify.errors import Change, HypothesisError, ParameterError, SimulationError
+from ptcc_certify.errors import HypothesisError, ParameterError, SimulationError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.size_limits import (
     EXACT_NODES,
@@ -109,46 +103,11 @@ def with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: b
     return certificate.changed(agents=proof, notes=tuple(notes), cut_off=tuple(cut_off), agents_run=motion)
 
 
-def with_small_delays(certificate: Certificate) -> Certificate:
-    """Add what Lyapunov functions of the whole graph prove with late messages, and the longest delay that was asked."""
-    late = certificate.proof.late
-    if late is None or late.tracks or late.messages.vehicles is not None:
-        return certificate
-    proof = certificate.graph_proof
-    case = replace(late.case, influence=proof.influence, forms=proof.decaying_forms)
-    late = replace(with_forms(replace(late, case=case)), longest_delay=longest_forgiven(case))
-    certificate, asked = certificate.changed(late=late), certificate.expectations.max_residual
-    if asked is not None and late.messages.age and certificate.graph_proof.graph.n_nodes <= EXACT_NODES:
-        certificate = certificate.changed(late=replace(late, enough=_longest_delay(certificate, late, asked)))
-    return certificate
-
-
-def _longest_delay(certificate: Certificate, late: LateBounds, asked: Fraction) -> Fraction | None:
-    """Return nearly the longest delay that leaves so little, if the check accepts what a certificate states of it."""
-    longest = longest_delay(late, asked)
-    if longest is None or longest is late:
-        return None if longest is None else late.messages.age
-    return None if rejects(certificate.changed(late=longest).checked) else longest.messages.age
-
-
 def check_disturbance(disturbance: Any, protocol: ReachingProtocol, graph: SignedDigraph) -> None:
     """Refuse a disturbance that no run will meet as a run would refuse it."""
     horizon = float(protocol.T) * (1 + PAST)  # as far as a run would go
     source = as_disturbance(disturbance, graph.n_nodes, protocol.delta, horizon)
     source.check(protocol.delta, graph.labels, horizon, rounding_slack(protocol))
-
-
-def with_word_of_check(certificate: Certificate) -> Certificate:
-    """Check a certificate, and note what the check has to say besides."""
-    report = certificate.checked
-    assert report is not None, "the certificate of a graph is always checked"
-    if report.accepted and report.memory > 1:
-        note = f"the check of this certificate needs more than 1 GB: allow {math.ceil(report.memory)} GB of memory"
-        return certificate.changed(notes=(*certificate.observed.notes, note))
-    if not report.accepted:
-        note = f"the independent check does not accept {report.rejected}: {report.reason}"
-        return certificate.changed(notes=(note, *certificate.observed.notes))
-    return certificate
 
 
 # ---------------------------------------------------------------------- the steps
@@ -187,8 +146,6 @@ class GraphSteps(OfQuestion):
             search = self.search(rate_proof)
             limit = self.upper_bound()
         matrix, result = self.final_state(trajectory)
-        ends = stated_ends(matrix, result, self.initial_state)
-        late = self.late_messages(ends)
         proved = [rate_proof.rate, *(V.rate for V in search.functions)]
         proof = GraphProof(
             question=self.question,
@@ -199,7 +156,6 @@ class GraphSteps(OfQuestion):
             limit=limit,
             final_state=result,
             matrix=matrix,
-            late=late,
         )
         observed = Observations(
             trajectory=trajectory,
@@ -299,22 +255,6 @@ class GraphSteps(OfQuestion):
                     f"the simulated run is still {gap:.1e} from the final state: its slowest modes had not settled"
                 )
         return matrix, result
-
-    def late_messages(self, ends: Sequence[Interval] | None) -> LateBounds | None:
-        """Bound what late messages and moving leaders leave at the deadline; None if neither is asked."""
-        messages = self.request.messages
-        if messages is None:
-            return None
-        if any(self.sigma0 or ()):
-            raise ParameterError(
-                (
-                    "late messages ask for sigma(0) = 0, so that no sliding variable moves; leave ",
-                    Change("sigma0"),
-                    " out",
-                )
-            )
-        leaders = self.request.leaders
-        return bound_late(LateCase(self.structure, self.protocol, messages, self.initial_state, ends, leaders))
 
 
 def _search_and_prove(

@@ -14,7 +14,7 @@ from ptcc_certify.certificate.request import Expectations, Question, Request
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.model import Protocol
-from ptcc_certify.model.late_messages import AtOnce, LateMessages
+from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.reaching_time import ReachingTime
 
@@ -156,12 +156,13 @@ class Proof(OfQuestion):
     def asked_messages(self) -> LateMessages | None:
         """How late messages are; None where they come at once and exactly."""
         messages = self.request.messages if self.late is None else self.late.messages
-        return None if isinstance(messages, AtOnce) else messages
+        return None if messages is None or messages.tracks else messages
 
     @property
     def asked_leaders(self) -> MovingLeaders | None:
         """How leaders move."""
-        return self.request.leaders if self.late is None else self.late.leaders
+        messages = self.request.messages if self.late is None else self.late.messages
+        return None if messages is None else messages.leaders
 
     @property
     def leaders_move(self) -> bool:

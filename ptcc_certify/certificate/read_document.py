@@ -37,8 +37,8 @@ from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.checker.theorem_function import PaperSection
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import Structure, analyse
-from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound
 from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.slow_signals import SignalRateBound
 from ptcc_certify.model import Protocol
 from ptcc_certify.model.reaching_time import ReachingTime
 from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
@@ -59,7 +59,7 @@ def read_document(source: Source) -> tuple[GraphProof | FamilyProof, Observation
     request = replace(request, **read_unproved(document, subject))
     relative = state is None if isinstance(subject, Family) else sections["final_state"] is None
     late = read_late(source.report, subject, protocol, relative)
-    late = late or nothing_proved(request.messages, request.leaders, subject, protocol, state is None)
+    late = late or nothing_proved(request.messages, subject, protocol, state is None)
     words: dict[str, Any] = {
         "question": Question(subject, protocol, state, fractions(sections["sliding_variable"]), request),
         "reaching": read_reaching(sections.get("reaching_time"), protocol),
@@ -141,7 +141,7 @@ def _read_family_proof(source: Source, family: Family, words: dict[str, Any]) ->
     )
 
 
-def _read_bounds(stated: Any, components: Sequence[FamilyComponent]) -> list[FamilyRateBound | None]:
+def _read_bounds(stated: Any, components: Sequence[FamilyComponent]) -> list[SignalRateBound | None]:
     """Prove the upper bounds anew that a file states, one for each component."""
     entries = stated if isinstance(stated, list) and len(stated) == len(components) else [None] * len(components)
     return [

@@ -29,7 +29,6 @@ from ptcc_certify.model.constrained_switching import SignalClass, read_signal
 from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.model.late_messages import LateMessages
-from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.parameters import parameter
 from ptcc_certify.model.reaching_time import ReachingTime, certified_reaching_times
 
@@ -56,9 +55,7 @@ class Request:
     noise : Fraction or None
         Nominal protocol: bound of the measurement noise that is judged under each of the limits.
     messages : LateMessages or None
-        How late is what agents hear.
-    leaders : MovingLeaders or None
-        How leaders move.
+        How late is what agents hear, and how leaders move.
     signal : {"any", "constant"}, DwellTime, JointWindows or ClockShares
         Of a family: restricted signals of which more is claimed than of every signal.
     time_limit : float
@@ -81,7 +78,6 @@ class Request:
     delta: Fraction | None = None
     noise: Fraction | None = None
     messages: LateMessages | None = None
-    leaders: MovingLeaders | None = None
     signal: SignalClass = "any"
     time_limit: float = math.inf
     by_work: bool = False
@@ -155,7 +151,6 @@ def read_request(
         delta=None if asks.delta is None else parameter("delta", asks.delta),
         noise=None if asks.noise is None else parameter("noise", asks.noise),
         messages=case.messages,
-        leaders=case.leaders,
         signal=read_signal(case.signal),
         time_limit=read_seconds(asks.time_limit, structure.graph),
         by_work=asks.time_limit is None,

@@ -11,11 +11,9 @@ import numpy as np
 from ptcc_certify.bounds.envelope import FLOOR_FACTOR
 from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.family_proof import BoundFunction
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.lyapunov.family_function import FamilyFunction
-from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.common_forms import CommonForm
 from ptcc_certify.simulation.member_laplacians import Members
 from ptcc_certify.simulation.switching_signals import WorstCaseSignal
 from ptcc_certify.simulation.trajectory import Trajectory
@@ -142,18 +140,16 @@ def worst_case_signals(certificate: Certificate, step: float | None = None) -> l
         On the clock, as for :class:`~ptcc_certify.simulation.switching_signals.WorstCaseSignal`.
     """
     n = certificate.family_proof.family.n_nodes
-    against = [WorstCaseSignal.against(V, quotient, nodes, n, step) for nodes, quotient, V in functions_of(certificate)]
+    against = [WorstCaseSignal.against(V, nodes, n, step) for nodes, V in functions_of(certificate)]
     return [*against, WorstCaseSignal(step=step)]
 
 
-def functions_of(certificate: Certificate) -> Iterator[tuple[np.ndarray, Quotient, FamilyFunction]]:
-    """Yield every quadratic Lyapunov function with the nodes of its component and the coordinates it is in."""
+def functions_of(certificate: Certificate) -> Iterator[tuple[np.ndarray, CommonForm]]:
+    """Yield every quadratic Lyapunov function with the nodes of its component."""
     for part in certificate.family_proof.parts:
-        quadratic = [V for V in part.functions if isinstance(V, FamilyFunction)]
-        quotient = Quotient.of(part.component) if quadratic else None
-        for V in quadratic:
-            assert quotient is not None
-            yield part.component.nodes, quotient, V
+        for V in part.functions:
+            if isinstance(V, CommonForm):
+                yield part.component.nodes, V
 
 
 def _require_same(certificate: Certificate, run: Trajectory) -> None:
@@ -239,29 +235,25 @@ def _driven_ratios(certificate: Certificate, run: Trajectory, floor: float) -> I
     before = np.isfinite(run.clock)
     y = (run.states - run.sliding.sigma)[:, before]
     for number, part in enumerate(proof.parts):
-        for V, own in zip(part.functions, proof.bound_functions[number], strict=True):
-            if isinstance(V, FamilyFunction) and isinstance(own, BoundFunction) and V.rate > 0:
-                root, size = _roots(part.component.nodes, own.quotient, V, y, floor)
-                bound = proof.norm_bound(own, number, run.remaining[before])
+        for V in part.functions:
+            if isinstance(V, CommonForm) and V.rate > 0:
+                root, size = _roots(part.component.nodes, V, y, floor)
+                bound = proof.norm_bound(V, number, run.remaining[before])
                 yield _worst(root - size, bound) or 0.0
 
 
-def _roots(
-    nodes: np.ndarray, quotient: Quotient, V: FamilyFunction, x: np.ndarray, floor: float
-) -> tuple[np.ndarray, float]:
+def _roots(nodes: np.ndarray, V: CommonForm, x: np.ndarray, floor: float) -> tuple[np.ndarray, float]:
     """Return ``sqrt(V)`` of states, and what an error of the floor in every one of them makes of it."""
-    signal = WorstCaseSignal.against(V, quotient, nodes, len(x))
+    signal, quotient = WorstCaseSignal.against(V, nodes, len(x)), V.quotient
     assert signal.form is not None
     coordinates = [1 + sum((abs(b) for b in quotient.basis[v]), Fraction(0)) for v in quotient.nodes]
     size = float(V.highest) ** 0.5 * float(np.linalg.norm([float(c) for c in coordinates])) * floor
     return np.sqrt(np.maximum((x * (signal.form @ x)).sum(axis=0), 0.0)), size
 
 
-def _lyapunov_ratios(
-    nodes: np.ndarray, quotient: Quotient, V: FamilyFunction, run: Trajectory, floor: float
-) -> tuple[float, float]:
+def _lyapunov_ratios(nodes: np.ndarray, V: CommonForm, run: Trajectory, floor: float) -> tuple[float, float]:
     """Return the worst ratios of ``sqrt(V)`` to its bounds by one rate, and by those of the modes."""
-    root, size = _roots(nodes, quotient, V, run.states[:, np.isfinite(run.clock)], floor)
+    root, size = _roots(nodes, V, run.states[:, np.isfinite(run.clock)], floor)
     assert run.played is not None
     clock, spent = run.clock[: root.size], run.played.clock_of_modes(run.clock)[:, : root.size]
     rates = np.array([float(rate) for rate in V.rates])

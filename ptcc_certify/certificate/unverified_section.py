@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ptcc_certify.bounds.delay.case import LateCase, read_leaders
+from ptcc_certify.bounds.delay.case import LateCase
 from ptcc_certify.bounds.delay.late_messages import LateBounds, delays, read_messages
 from ptcc_certify.bounds.envelope import FRACTIONS, LAST_INSTANTS
 from ptcc_certify.bounds.input.effort import LIMITS, Effort
@@ -31,20 +31,19 @@ from ptcc_certify.errors import one_line
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure, behaviour_name
-from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound, Member, prove_again
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.search import METHODS
+from ptcc_certify.lyapunov.slow_signals import Member, SignalRateBound, prove_again
 from ptcc_certify.model.base import Protocol
 from ptcc_certify.model.constrained_switching import SignalClass
 from ptcc_certify.model.late_messages import LateMessages
-from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.theorems.counterexample_text import mode_name
 
 #: Members of a word or mixture that are read.
 _MANY = 100
 
 
-def upper_bound_entry(quotient: Quotient, bound: FamilyRateBound) -> dict[str, Any]:
+def upper_bound_entry(quotient: Quotient, bound: SignalRateBound) -> dict[str, Any]:
     """Return a bound as JSON-ready data.
 
     Each member has its mode and the weights of its uncertain edges as ``[source, target, weight]``; those that change
@@ -53,9 +52,9 @@ def upper_bound_entry(quotient: Quotient, bound: FamilyRateBound) -> dict[str, A
 
     Examples
     --------
-    >>> from ptcc_certify.lyapunov.family_rate_upper_bound import prove_family_rate_bound
+    >>> from ptcc_certify.lyapunov.slow_signals import prove_signal_rate_bound
     >>> quotient = Quotient(Family.from_intervals([("a", "b", 1, 2)]))
-    >>> upper_bound_entry(quotient, prove_family_rate_bound(quotient))["members"]
+    >>> upper_bound_entry(quotient, prove_signal_rate_bound(quotient))["members"]
     [{'mode': 0, 'name': 'the graph', 'weights': [['a', 'b', '1']]}]
     """
     members = [
@@ -76,7 +75,7 @@ def _weights(quotient: Quotient, member: Member) -> list[list[str]]:
     return weights
 
 
-def read_upper_bound(quotient: Quotient, entry: Any) -> FamilyRateBound | None:
+def read_upper_bound(quotient: Quotient, entry: Any) -> SignalRateBound | None:
     """Return a bound that the file states, proved anew from its members; None if it is none, or not proved.
 
     Examples
@@ -119,7 +118,7 @@ def write_unproved(proof: GraphProof | FamilyProof) -> dict[str, Any]:
     """Return the late messages or moving leaders that were asked for where nothing is proved of them."""
     if (late := proof.late) is None or late.says_something:
         return {}
-    return {"messages": write(Delays, delays(late.messages, late.case.of, late.leaders), Writer(proof.labels))}
+    return {"messages": write(Delays, delays(late.messages, late.case.of), Writer(proof.labels))}
 
 
 def read_unproved(document: Mapping[str, Any], structure: Structure | Family) -> dict[str, Any]:
@@ -133,16 +132,11 @@ def read_unproved(document: Mapping[str, Any], structure: Structure | Family) ->
     section: Delays | None = readable(lambda: read(Delays, asked["messages"], at, "messages"))
     if section is None:
         return {}
-    moving = section.leaders
-    return {
-        "messages": readable(lambda: read_messages(section, structure)),
-        "leaders": None if moving is None else readable(lambda: read_leaders(moving)),
-    }
+    return {"messages": readable(lambda: read_messages(section, structure))}
 
 
 def nothing_proved(
     messages: LateMessages | None,
-    leaders: MovingLeaders | None,
     structure: Structure | Family,
     protocol: Protocol,
     relative: bool,
@@ -152,7 +146,6 @@ def nothing_proved(
     Parameters
     ----------
     messages : LateMessages or None
-    leaders : MovingLeaders or None
     structure : Structure or Family
     protocol : Protocol
     relative : bool
@@ -160,7 +153,7 @@ def nothing_proved(
     """
     if messages is None:
         return None
-    return LateBounds(LateCase(structure, protocol, messages, leaders=leaders), relative)
+    return LateBounds(LateCase(structure, protocol, messages), relative)
 
 
 def _write_signals(proof: FamilyProof) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,8 +21,10 @@ from ptcc_certify.cli.agents import (
 )
 from ptcc_certify.cli.click_options import Command, one_of
 from ptcc_certify.cli.families import (
-    certify_family,
+    asked_signal,
+    decided_alone,
     family_options,
+    names_of_family,
     read_graph_or_family,
     refuse_restricted,
     restricted_options,
@@ -31,6 +34,7 @@ from ptcc_certify.cli.messages_and_leaders import (
     leaders_of,
     message_options,
     messages_of,
+    noted_delays,
     refuse_unheard,
 )
 from ptcc_certify.cli.scenario import scenario_record
@@ -43,7 +47,9 @@ from ptcc_certify.model.initial_state import InitialState
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.graphs.digraph import SignedDigraph
+    from ptcc_certify.graphs.family import Family
     from ptcc_certify.model import Protocol
+    from ptcc_certify.model.constrained_switching import SignalClass
 
 
 @click.command(cls=Command)
@@ -79,93 +85,107 @@ def certify(graph: tuple[str, ...], output: str | None, as_json: bool, screen: S
     Prints 8 lines, 10 or so where the answers take more; -v tells rates, the Lyapunov functions searched and used,
     proof obligations and the simulated run. Exit code 0: certified, and everything asked holds.
     """
+    from ptcc_certify.certificate import family_certification, graph_certification
+    from ptcc_certify.certificate.assessment import CERTIFIED, rejects
+    from ptcc_certify.certificate.certification import certify_case
     from ptcc_certify.graphs.family import Family
+    from ptcc_certify.report.facts.of_certificate import facts_of
 
     refuse_output(output)
     protocol, given = shared.protocol_of(options), read_graph_or_family(graph, options)
-    if isinstance(given, Family):
+    family = given if isinstance(given, Family) else None
+    if family is not None:
         refuse_agents_of_family(options, "certify")
     refuse_dimension(options, "certify")
-    if isinstance(given, Family):
-        return certify_family(graph, given, output, as_json, screen, options)
-    refuse_restricted(options)
-    return _certify_graph(graph[0], given, protocol, output, as_json, screen, options)
-
-
-def _certify_graph(
-    graph: str,
-    signed: SignedDigraph,
-    protocol: Protocol,
-    output: str | None,
-    as_json: bool,
-    screen: Screen,
-    options: shared.Options,
-) -> int:
-    """Certify what the protocol does on one graph."""
-    from ptcc_certify.certificate.assessment import rejects
-    from ptcc_certify.certificate.certification import certify_case
-    from ptcc_certify.certificate.graph_certification import STEPS
-    from ptcc_certify.report.facts.of_certificate import facts_of
-
-    LOG.info("%s", one_line(f"read {graph}: {signed.n_nodes} nodes, {signed.n_edges} edges"))
-    case, origins = _case_of(graph, signed, protocol, options), _origins(options)
-    with progress(STEPS, screen.quiet) as begin:
-        named = {"graph": Path(graph).name, **origins}
+    if family is None:
+        refuse_restricted(options)
+        signal: SignalClass = "any"
+    else:
+        signal = asked_signal(family, protocol, options)
+    size = repr(given) if isinstance(given, Family) else f"{given.n_nodes} nodes, {given.n_edges} edges"
+    LOG.info("%s", one_line(f"read {', '.join(graph)}: {size}"))
+    if family is not None and (code := decided_alone(graph, family, output, as_json, screen, options)) is not None:
+        return code
+    case = _case_of(graph, given, signal, protocol, options)
+    name, origins = graph[0], _origins(options, family is None)
+    if family is not None:
+        name, read = names_of_family(graph, family, options)
+        origins = {"read": read, **origins}
+    steps = graph_certification.STEPS if family is None else family_certification.STEPS
+    with progress(steps, screen.quiet) as begin:
+        named = {"graph": Path(name).name, **origins}
         certificate: Any = certify_case(case, progress=begin, scenario=scenario_record(), origins=named)
+        assessment = certificate.assessment
     _log_result(certificate)
-    saved = output is not None and not rejects(certificate.checked)
+    saved = not rejects(certificate.checked) if family is None else assessment.verdict == CERTIFIED
     if output and saved:
         certificate.save(output)
         LOG.info("%s", one_line(f"written {output}"))
-    assessment = certificate.assessment
     if as_json:
-        print_json(certificate.to_dict())
+        print_json(certificate.to_dict() | ({} if family is None else {"verdict": assessment.verdict}))
         if assessment.exit_code and not screen.quiet:
             click.echo(f"verdict    {in_flags(assessment.sentence)}", err=True)
-        return assessment.exit_code
-    screen.show(lambda details: facts_of(certificate, graph, origins, details))
+        return assessment.exit_code  # type: ignore[no-any-return]
+    screen.show(lambda details: facts_of(certificate, name, origins, details))
     if output:
         screen.note(shared.written(certificate, output) if saved else shared.NOTHING_WRITTEN)
-    return assessment.exit_code
+    return assessment.exit_code  # type: ignore[no-any-return]
 
 
-def _case_of(graph: str, signed: SignedDigraph, protocol: Protocol, options: shared.Options) -> Case:
-    """Return what the options ask of a graph; a cap of the gain is that of agents, unless a formation has more limits.
+def _case_of(
+    graphs: tuple[str, ...],
+    given: SignedDigraph | Family,
+    signal: SignalClass,
+    protocol: Protocol,
+    options: shared.Options,
+) -> Case:
+    """Return what the options ask of a graph or a family.
 
-    Under ``--leader-speed`` it is the followers that ``--delta`` disturbs.
+    A cap of the gain is that of agents, unless a formation has more limits, and of a family that of late messages or
+    of the followers of leaders. Under ``--leader-speed`` it is the followers that ``--delta`` disturbs.
     """
-    disturbance, asks = shared.disturbance_of(protocol, options, signed), shared.asks_of(options)
-    sigma0 = shared.sigma0_of(protocol, options, signed)
-    agents, initial = agents_and_states(options, signed, certified=True)
-    limits = shared.limits_of(options) if options["kind"] == "nominal" else ()
+    from ptcc_certify.graphs.family import Family
+
+    family = isinstance(given, Family)
+    one, asks = given.modes[0].mandatory if isinstance(given, Family) else given, shared.asks_of(options)
+    disturbance = None if family else shared.disturbance_of(protocol, options, one)
+    sigma0 = shared.sigma0_of(protocol, options, one)
+    agents, initial = agents_and_states(options, one, certified=True)
     if initial is None:
-        initial = InitialState(shared.read_initial_state(options["x0"], options["seed"], signed))
-    if agents is not None:
+        initial = InitialState(shared.read_initial_state(options["x0"], options["seed"], one))
+    limits = shared.limits_of(options) if options["kind"] == "nominal" else ()
+    if agents is not None and not family:
         more = any(limit.stop_before is not None or limit.sample_period is not None for limit in limits)
         agents, limits = (replace(agents, gain_cap=None), limits) if more else (agents, ())
         disturbance = disturbance if more or agents.of_paper else None
-    refuse_unheard(signed, options)
-    messages, leaders = messages_of((graph,), signed, options), leaders_of(options)
+    if not family:
+        refuse_unheard(one, options)
+    messages, leaders = messages_of(graphs, given, options), leaders_of(options)
+    if family and messages is not None:
+        limits = ()  # a cap is theirs
+    if isinstance(given, Family) and messages is not None and isinstance(messages.delay, Mapping):
+        given = replace(given, notes=noted_delays(given.notes, options["delay"]))
     if options["kind"] == "nominal":
         asks = replace(asks, noise=options["noise"], delta=options["delta"] if leaders is None else None)
     asks, initial = replace(asks, disturbance=disturbance), replace(initial, sigma0=sigma0)
-    return Case(signed, protocol, initial, agents=agents, messages=messages, leaders=leaders, limits=limits, asks=asks)
+    beside: dict[str, Any] = {"agents": agents, "messages": messages, "leaders": leaders, "limits": limits}
+    return Case(given, protocol, initial, signal=signal, asks=asks, **beside)
 
 
-def _origins(options: shared.Options) -> dict[str, str]:
-    """Return which of ``x(0)`` and ``sigma(0)`` were drawn, and with which seed."""
+def _origins(options: shared.Options, alone: bool) -> dict[str, str]:
+    """Return which of ``x(0)`` and ``sigma(0)`` were drawn, and with which seed; of one graph ``alone`` also 0."""
     states = {"x(0)": options["x0"], "sigma(0)": options["sigma0"], "v(0)": options["v0"], "a(0)": options["a0"]}
     drawn = {name: f"random, seed {options['seed']}" for name, text in states.items() if text == "random"}
-    moved = ("v(0)", "a(0)")[: NAMES.get(options["agents"], 1) - 1]
+    moved = ("v(0)", "a(0)")[: NAMES.get(options["agents"], 1) - 1 if alone else 0]
     return drawn | {name: "0" for name in moved if states[name] in (None, "0")}
 
 
 def _log_result(certificate: Certificate) -> None:
     """Log what was searched, what the time limit cut off, and what was decided."""
-    search = certificate.search
-    for kind, rate in search.searched.items():
+    searched = {} if certificate.of_family else certificate.search.searched
+    for kind, rate in searched.items():
         LOG.info("searched %s: numerical decay rate %.6g", kind, rate)
-    for V in certificate.graph_proof.functions:
+    for V in () if certificate.of_family else certificate.graph_proof.functions:
         LOG.info("proved %s: decay rate %s", V.kind, down(V.proved_rate))
     for part in certificate.observed.cut_off:
         LOG.warning("cut off by the time limit of %g s: %s", certificate.time_limit, part)

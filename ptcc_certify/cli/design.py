@@ -30,8 +30,7 @@ from ptcc_certify.model.asks import Asks, Expectations
 from ptcc_certify.report.text_layout import wrap_command
 
 if TYPE_CHECKING:
-    from ptcc_certify.gain_design.agents_answer import AgentsDesign
-    from ptcc_certify.gain_design.answer import Design
+    from ptcc_certify.gain_design.answer import AgentsDesign, Design
     from ptcc_certify.graphs.digraph import SignedDigraph
 
 #: What a scenario may ask that no gains are searched under, and what of these agents of order n take.

@@ -19,7 +19,7 @@ from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.model.run import Run
 
 if TYPE_CHECKING:
-    from ptcc_certify.gain_design.agents_answer import AgentsDesign
+    from ptcc_certify.gain_design.answer import AgentsDesign
     from ptcc_certify.graphs.digraph import SignedDigraph
 
 #: Sliding terms, which are kept.
@@ -61,7 +61,7 @@ def refuse_of_agents() -> None:
 
 def design_of_agents(signed: SignedDigraph, options: Options) -> AgentsDesign:
     """Return the deadline of the agents that the options tell."""
-    from ptcc_certify.gain_design.agents_shortest_deadline import design_agents
+    from ptcc_certify.gain_design.deadline_search import design_agents
 
     if options["input_norm"]:
         raise ParameterError("--input-norm: is of single integrators; of agents in space U bounds ||u_k|| as it is")

@@ -3,33 +3,21 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from io import BytesIO
-from pathlib import Path, PurePath
+from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.agents import agents_and_states, exchanges_virtual
 from ptcc_certify.cli.click_options import SIGNAL, click_option, flag_of, options_asking, options_for, together
-from ptcc_certify.cli.messages_and_leaders import (
-    asks_for_leaders,
-    asks_for_messages,
-    leaders_of,
-    messages_of,
-    noted_delays,
-)
-from ptcc_certify.cli.scenario import scenario_record
-from ptcc_certify.cli.terminal import LOG, Screen, in_flags, print_json, progress
+from ptcc_certify.cli.terminal import Screen, print_json
 from ptcc_certify.errors import ExitCode, ParameterError, one_line
 from ptcc_certify.graphs.declared_option import options_of
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import OPTIONAL, UNCERTAINTY
-from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.case import Case
 from ptcc_certify.model.constrained_switching import (
     CLOCK_DWELL,
     WINDOWS_OF_TIME,
@@ -37,19 +25,20 @@ from ptcc_certify.model.constrained_switching import (
     DwellTime,
     JointWindows,
 )
-from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.model.refusals import NOT_OF_FAMILIES
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
+    from ptcc_certify.model import Protocol
     from ptcc_certify.model.constrained_switching import SignalClass
     from ptcc_certify.theorems.family_behaviour import FamilyComponent
 
 #: Options of certify that families do not take; agents are refused by themselves, disturbances by the protocol.
 _NOT_OF_FAMILIES = tuple(
-    name for name in options_asking(["method", *NOT_OF_FAMILIES]) if name not in ("agents", "disturbance", "delta")
+    name
+    for name in options_asking(["method", *NOT_OF_FAMILIES])
+    if name not in ("agents", "disturbance", "delta", "noise", "gain_cap")
 )
 
 
@@ -186,7 +175,7 @@ def _standard_input() -> BytesIO:
     return file
 
 
-def _names(graphs: tuple[str, ...], family: Family, options: shared.Options) -> tuple[str, str]:
+def names_of_family(graphs: tuple[str, ...], family: Family, options: shared.Options) -> tuple[str, str]:
     """Return what a family is called, and how its rows were read."""
     from ptcc_certify.graphs.io.graph_files import MATRICES
     from ptcc_certify.report.facts.graph import ORIENTATION
@@ -227,7 +216,7 @@ def _show_decision(
     if as_json:
         print_json(decision_document(family, components))
         return
-    name, read = _names(graphs, family, options)
+    name, read = names_of_family(graphs, family, options)
     screen.show(lambda details: decision_facts(components, family, name, read, details))
 
 
@@ -250,65 +239,33 @@ def _expected(components: Sequence[FamilyComponent], expect: str | None) -> int:
     return ExitCode.OK
 
 
-def certify_family(
-    graphs: tuple[str, ...], family: Family, output: str | None, as_json: bool, screen: Screen, options: shared.Options
-) -> int:
-    """Certify what the protocol does on a family, whatever the signal."""
-    from ptcc_certify.certificate.assessment import CERTIFIED
-    from ptcc_certify.certificate.certification import certify_case
+def asked_signal(family: Family, protocol: Protocol, options: shared.Options) -> SignalClass:
+    """Return the signals of which more is asked of a family, or refuse what is certified of one graph alone."""
     from ptcc_certify.certificate.constrained_switching.search import require_nominal
-    from ptcc_certify.certificate.family_certification import STEPS
-    from ptcc_certify.report.facts.of_certificate import facts_of
-    from ptcc_certify.theorems.family_behaviour import decide
 
     refuse_options(options)
     _refuse_disturbance(options)
-    expected = shared.asks_of(options).expectations
     given, modes = len(options["share"]), len(family.modes)
     if given not in (0, modes):
         raise ParameterError(f"--share: {given} given, and {modes} modes; give one for each, outages too")
     signal = signals_of(options)
-    protocol = shared.protocol_of(options)
     require_nominal(signal, protocol)
-    x0 = shared.read_initial_state(options["x0"], options["seed"], family.modes[0].mandatory)
-    sigma0 = shared.sigma0_of(protocol, options, family.modes[0].mandatory)
-    LOG.info("%s", one_line(f"read {', '.join(graphs)}: {family!r}"))
-    if signal == "constant" and (left := _constant_alone(decide(family, "constant"), decide(family))):
-        if expected.max_input is not None or expected.min_rate is not None:
-            raise ParameterError("--min-rate and --max-input: no rate is certified of members that end differently")
-        _show_decision(graphs, family, left, as_json, screen, options)
-        return _judged_alone(left, options["expect"], output)
-    name, read = _names(graphs, family, options)
-    states = {"x(0)": options["x0"], "sigma(0)": options["sigma0"], "v(0)": options["v0"]}
-    random_states = {what: f"random, seed {options['seed']}" for what, text in states.items() if text == "random"}
-    with progress(STEPS, screen.quiet) as begin:
-        origins = {"graph": Path(name).name, "read": read, **random_states}
-        asks = Asks(time_limit=options["time_limit"], expectations=expected)
-        beside: dict[str, Any] = {"messages": messages_of(graphs, family, options), "leaders": leaders_of(options)}
-        if options["kind"] == "nominal":
-            asks = replace(asks, noise=options["noise"], delta=None if beside["leaders"] else options["delta"])
-        if beside["messages"] is None and beside["leaders"] is not None and options["gain_cap"] is not None:
-            beside["limits"] = GainLimits(gain_cap=options["gain_cap"])
-        if beside["messages"] is not None and isinstance(beside["messages"].delay, Mapping):
-            family = replace(family, notes=noted_delays(family.notes, options["delay"]))
-        agents, begun = agents_and_states(options, family.modes[0].mandatory, certified=True)
-        beginning = InitialState(x0, sigma0) if begun is None else replace(begun, sigma0=sigma0)
-        case = Case(family, protocol, beginning, signal=signal, agents=agents, asks=asks, **beside)
-        certificate: Any = certify_case(case, progress=begin, scenario=scenario_record(), origins=origins)
-        assessment = certificate.assessment
-    LOG.info("verdict %s; exit code %d", in_flags(assessment.sentence), assessment.exit_code)
-    saved = output is not None and assessment.verdict == CERTIFIED
-    if output and saved:
-        certificate.save(output)
-    if as_json:
-        print_json(certificate.to_dict() | {"verdict": assessment.verdict})
-        if assessment.exit_code and not screen.quiet:
-            click.echo(f"verdict    {in_flags(assessment.sentence)}", err=True)
-        return assessment.exit_code
-    screen.show(lambda details: facts_of(certificate, name, origins, details))
-    if output:
-        screen.note(f"written    {output}" if saved else shared.NOTHING_WRITTEN)
-    return assessment.exit_code
+    return signal
+
+
+def decided_alone(
+    graphs: tuple[str, ...], family: Family, output: str | None, as_json: bool, screen: Screen, options: shared.Options
+) -> int | None:
+    """Show what fixed weights do of which no certificate is made, and return the exit code; None where one is."""
+    from ptcc_certify.theorems.family_behaviour import decide
+
+    left = _constant_alone(decide(family, "constant"), decide(family)) if options["signal"] == "constant" else ()
+    if not left:
+        return None
+    if options["max_input"] is not None or options["min_rate"] is not None:
+        raise ParameterError("--min-rate and --max-input: no rate is certified of members that end differently")
+    _show_decision(graphs, family, left, as_json, screen, options)
+    return _judged_alone(left, options["expect"], output)
 
 
 def _judged_alone(components: Sequence[FamilyComponent], expect: str | None, output: str | None) -> int:
@@ -337,13 +294,7 @@ def _refuse_disturbance(options: shared.Options) -> None:
 def refuse_options(options: shared.Options) -> None:
     """Refuse what is asked of one graph alone, on the command line or in a scenario."""
     source = click.get_current_context().get_parameter_source
-    foreign = [*_NOT_OF_FAMILIES]
-    if options["kind"] == "nominal":
-        foreign += ["disturbance", "delta"]
-    by_rows = asks_for_messages(options) or asks_for_leaders(options)
-    if by_rows or exchanges_virtual(options):
-        taken = ("gain_cap", "delta", "noise") if by_rows else ("gain_cap",)
-        foreign = [name for name in foreign if name not in taken]
+    foreign = [*_NOT_OF_FAMILIES, *(["disturbance"] if options["kind"] == "nominal" else [])]
     for name in foreign:
         given = source(name) in (ParameterSource.COMMANDLINE, ParameterSource.DEFAULT_MAP)
         if given and options[name] not in (None, False):

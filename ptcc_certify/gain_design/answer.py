@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from ptcc_certify.gain_design.request import DesignRequest, Request, fit_of
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, short_exact
 from ptcc_certify.lazy_report import Shown, rendered
 from ptcc_certify.model import Protocol
+from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.parameters import parameter
 
 MET, INFEASIBLE, UNPROVED = "met", "infeasible", "not with this certificate"
@@ -89,6 +90,7 @@ class DesignAnswer(Shown):
     residual: Fraction | None = None
     shortest_possible: Fraction | None = None
     repeatable: bool = False
+    residual_name: ClassVar[str]
 
     @property
     def protocol(self) -> Protocol | None:
@@ -104,19 +106,39 @@ class DesignAnswer(Shown):
         return f"no gains meet a deadline below {down(least)}, {down(least / T)} times the one asked for"
 
     @property
-    @abstractmethod
     def request_text(self) -> str:
         """What was asked, in one line."""
+        deadline, residual = self.asked.deadline, self.asked.residual
+        text = f"{self.size} <= {short_exact(self.asked.max_input)} from {self.states_text}, "
+        text += "shortest deadline" if deadline is None else f"deadline {short_exact(deadline)}"
+        return text + ("" if residual is None else f", {self.residual_name} {short_exact(residual)}")
 
     @property
-    @abstractmethod
     def bounds_text(self) -> str:
         """What is proved of input and deviation at the deadline, in one line; empty without gains."""
+        if self.peak is None or self.residual is None:
+            return ""
+        return f"{self.size} <= {up(self.peak)}, {self.ends_text(self.residual)} at T"
 
     @property
     @abstractmethod
+    def size(self) -> str:
+        """The size of the input that is limited, in symbols."""
+
+    @property
+    @abstractmethod
+    def states_text(self) -> str:
+        """The initial states."""
+
+    @abstractmethod
+    def ends_text(self, residual: Fraction) -> str:
+        """Return how near to their ends all agents are."""
+
+    @property
     def gains_text(self) -> str:
-        """The gains, exact, in one line; empty where there are none."""
+        """The parameters of the protocol, exact, in one line; empty where there are none."""
+        p = self.protocol
+        return "" if p is None else ", ".join(f"{name}={short_exact(value)}" for name, value in p.parameters.items())
 
     @property
     @abstractmethod
@@ -182,6 +204,7 @@ class Design(DesignAnswer):
     ('met', True)
     """
 
+    residual_name: ClassVar = "deviation"
     asked: DesignRequest
     product: Fraction | None = None
     lower_by: str = ""
@@ -296,33 +319,32 @@ class Design(DesignAnswer):
         return np.geomspace(middle / 5, middle * 5, count)
 
     @property
-    def request_text(self) -> str:
-        """What was asked, in one line."""
-        initial_set, deadline, residual = self.asked.initial_set, self.asked.deadline, self.asked.residual
+    def size(self) -> str:
+        """The size of the input that is limited, in symbols."""
+        return "||u||" if self.asked.input_norm == 2 else "|u_k|"
+
+    @property
+    def states_text(self) -> str:
+        """The initial states."""
+        initial_set = self.asked.initial_set
         R = max(initial_set.radius, default=Fraction(0))
         box = not any(initial_set.center) and R and min(initial_set.radius) == R
-        states = f"all |x_k(0)| <= {short_exact(R)}" if box else "the given initial states"
-        size = f"{'||u||' if self.asked.input_norm == 2 else '|u_k|'} <= {short_exact(self.asked.max_input)}"
-        text = f"{size} from {states}, "
-        text += "shortest deadline" if deadline is None else f"deadline {short_exact(deadline)}"
-        return text + ("" if residual is None else f", deviation {short_exact(residual)}")
+        return f"all |x_k(0)| <= {short_exact(R)}" if box else "the given initial states"
+
+    def ends_text(self, residual: Fraction) -> str:
+        """Return how near to their final states all agents are."""
+        return f"every agent {f'within {up(residual)} of' if residual else 'at'} its final state"
 
     @property
     def bounds_text(self) -> str:
         """What is proved of input and deviation at the deadline, in one line; empty without gains."""
-        if self.peak is None or self.residual is None:
-            return ""
-        size = f"{'||u||' if self.asked.input_norm == 2 else '|u_k|'} <= {up(self.peak)}"
-        ends = f"within {up(self.residual)} of" if self.residual else "at"
-        text = f"{size}, every agent {ends} its final state at T"
-        return f"{text} (deviation 0)" if self.asked.residual is not None and not self.residual else text
+        text = super().bounds_text
+        return f"{text} (deviation 0)" if text and self.asked.residual is not None and not self.residual else text
 
     @property
     def gains_text(self) -> str:
         """The gains, exact, in one line; empty where there are none."""
-        if self.protocol is None:
-            return ""
-        text = ", ".join(f"{name}={short_exact(value)}" for name, value in self.protocol.parameters.items())
+        text = super().gains_text
         return text + ("" if self.gain_cap is None else f", gain saturated at {short_exact(self.gain_cap)} from t = 0")
 
     @property
@@ -358,3 +380,93 @@ class Design(DesignAnswer):
         p, cap = self.protocol, "" if self.gain_cap is None else f", gain_cap={short_exact(self.gain_cap)}"
         gains = f"T={short_exact(p.T)}, rho1={short_exact(p.rho1)}, rho2={short_exact(p.rho2)}{cap}"
         return f"Design({self.verdict}, {gains}, peak {up(self.peak)})"
+
+
+@dataclass(frozen=True, repr=False)
+class AgentsDesign(DesignAnswer):
+    """What was asked of agents of order n, and a deadline that is proved to meet it; made by :func:`design_agents`.
+
+    Attributes
+    ----------
+    peak, residual : Fraction or None
+        Proved at ``deadline``: the largest input of an agent, and what is left of a position under a gain cap.
+    shortest_possible : Fraction or None
+        No input within the limit brings the agents where the protocol does by a shorter deadline, proved; None if
+        nothing is known: under a gain cap, of agents that move by themselves, and of the cascade.
+    agents : Agents
+    too_short : Fraction or None
+        The longest deadline below ``deadline`` that was tried, and whose bounds do not keep the limit.
+
+    Examples
+    --------
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3)])
+    >>> answer = design_agents(pair, Agents(order=2), InitialState([1, 1], v0=[0, 1]), max_input=10)
+    >>> answer.verdict, answer.certificate.verdict, bool(answer.peak <= 10)
+    ('met', 'certified', True)
+    >>> bool(answer.shortest_possible <= answer.too_short < answer.deadline)
+    True
+    """
+
+    residual_name: ClassVar = "positions within"
+    agents: Agents = field(kw_only=True)
+    too_short: Fraction | None = None
+
+    @property
+    def gain_cap(self) -> Fraction | None:
+        """Where the gain is capped; None if it is not."""
+        return self.agents.cap
+
+    @property
+    def ratio(self) -> float | None:
+        """The deadline over the shortest possible one, rounded up; None where one is not known."""
+        if not self.deadline or not self.shortest_possible:
+            return None
+        return float_up(self.deadline / self.shortest_possible)
+
+    @property
+    def size(self) -> str:
+        """The size of the input that is limited, in symbols."""
+        return "||u_k||"
+
+    @property
+    def states_text(self) -> str:
+        """The initial states."""
+        return "the given initial state"
+
+    def ends_text(self, residual: Fraction) -> str:
+        """Return how near to their places all agents are."""
+        return f"every position within {up(residual)} of its place" if residual else "every agent in place"
+
+    @property
+    def gains_text(self) -> str:
+        """The parameters of the protocol, exact, and the gains of the agents; empty where there are none."""
+        if self.certificate is None or self.certificate.proof.agents is None:
+            return ""
+        return f"{super().gains_text}; {self.certificate.proof.agents.gains_text}"
+
+    @property
+    def deadline_text(self) -> str:
+        """What is proved of shorter deadlines, in one line; empty where nothing is."""
+        clauses = ["every one is met"] if self.peak == 0 else []
+        if self.certificate is not None and self.deadline is not None and self.too_short is not None:
+            clauses = [f"{short_exact(self.deadline)} is met, {short_exact(self.too_short)} not by these bounds"]
+        if self.shortest_possible is not None:
+            clauses.append(f"no gains meet one below {down(self.shortest_possible)}")
+        return "; ".join(clauses)
+
+    @property
+    def ratio_text(self) -> str:
+        """How far the deadline is from the shortest possible one, in one line; empty where that is not known."""
+        if self.ratio is None or self.certificate is None:
+            return ""
+        return f"the deadline is at most {up(self.ratio, 3)} times the shortest possible one"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the design as JSON-ready data, exact numbers as texts, without the certificate."""
+        own = {"agents": self.agents.text(), "ratio": self.ratio}
+        return self._summary() | texts(self, "too_short") | own
+
+    def __repr__(self) -> str:
+        if self.deadline is None or self.certificate is None or self.peak is None:
+            return f"AgentsDesign({self.verdict}: {self.binding})"
+        return f"AgentsDesign({self.verdict}, T={short_exact(self.deadline)}, peak {up(self.peak)})"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from ptcc_certify.checker.input_formulas import InitialSet, InputBounds
 from ptcc_certify.graphs.declared_option import option
@@ -37,6 +37,12 @@ class Request:
         unit="state",
     )
 
+    def met_by(self, fit: Any) -> bool:
+        """Tell whether what is proved of some gains suffices: ``fit.peak`` and ``fit.residual``, None if unknown."""
+        if fit.peak is None or fit.residual is None:
+            return False
+        return fit.peak <= self.max_input and fit.residual <= (self.residual or 0)
+
 
 @dataclass(frozen=True, kw_only=True)
 class DesignRequest(Request):
@@ -55,12 +61,6 @@ class DesignRequest(Request):
         "--input-norm", "2: U bounds ||u||, not each |u_k|.", required=True, example='"2"', choices=("2",)
     )
     initial_set: InitialSet
-
-    def met_by(self, fit: Fit) -> bool:
-        """Tell whether what is proved of some gains suffices."""
-        if fit.peak is None or fit.residual is None:
-            return False
-        return fit.peak <= self.max_input and fit.residual <= (self.residual or 0)
 
 
 class Fit(NamedTuple):

@@ -20,8 +20,8 @@ import numpy as np
 
 from lmi.common_lyapunov import least_value
 from lmi.errors import LMIError, OutOfTime
-from ptcc_certify.lyapunov.family_function import FamilyFunction
-from ptcc_certify.lyapunov.family_search import prove_certificate
+from ptcc_certify.lyapunov.common_form_search import prove_certificate
+from ptcc_certify.lyapunov.common_forms import CommonForm
 from ptcc_certify.lyapunov.quotient import Quotient
 
 #: Losses of the rate, for late instants and earlier ones.
@@ -49,8 +49,8 @@ class Aim:
 
 
 def aimed_functions(
-    quotient: Quotient, aim: Aim, known: Sequence[FamilyFunction], notes: list[str]
-) -> Iterator[FamilyFunction]:
+    quotient: Quotient, aim: Aim, known: Sequence[CommonForm], notes: list[str]
+) -> Iterator[CommonForm]:
     """Yield proved functions, each of which improves a bound of an aim over those before it.
 
     Parameters
@@ -58,7 +58,7 @@ def aimed_functions(
     quotient : Quotient
         Of 2 to 24 rows.
     aim : Aim
-    known : sequence of FamilyFunction
+    known : sequence of CommonForm
         Functions at hand; nothing is yielded without one that decays.
     notes : list of str
         Is told what failed.
@@ -66,11 +66,11 @@ def aimed_functions(
     Examples
     --------
     >>> from ptcc_certify.graphs.family import Family
-    >>> from ptcc_certify.lyapunov.family_search import search_family
+    >>> from ptcc_certify.lyapunov.common_form_search import search_common_forms
     >>> from ptcc_certify.theorems.family_behaviour import decide
     >>> chain = Family.from_intervals([("a", "b", 1, 2), ("b", "c", 1, 2)])
     >>> quotient = Quotient.of(decide(chain)[0])
-    >>> known, aim = search_family(quotient, slower=False).functions, Aim(np.array([1.0, 0.0]), np.array([2.0]))
+    >>> known, aim = search_common_forms(quotient, slower=False).functions, Aim(np.array([1.0, 0.0]), np.array([2.0]))
     >>> [V.kind for V in aimed_functions(quotient, aim, known, [])]
     ['full', 'full']
     """

@@ -15,8 +15,8 @@ from lmi.errors import LMIError, OutOfTime
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
-from ptcc_certify.lyapunov.family_function import FamilyFunction
-from ptcc_certify.lyapunov.family_search import search_family
+from ptcc_certify.lyapunov.common_form_search import search_common_forms
+from ptcc_certify.lyapunov.common_forms import CommonForm
 from ptcc_certify.lyapunov.mode_forms import within_reach
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
@@ -28,7 +28,7 @@ class ShareForm:
 
     Attributes
     ----------
-    function : FamilyFunction
+    function : CommonForm
         ``V <= V(0) e^(-sum_i rates_i s_i)``, where mode ``i`` has acted for ``s_i``.
     behaviour : "stability" or "bipartite consensus"
         Where the mean of the rates is positive.
@@ -36,7 +36,7 @@ class ShareForm:
         Of each mode, whether nothing moves in it.
     """
 
-    function: FamilyFunction
+    function: CommonForm
     behaviour: str
     at_rest: tuple[bool, ...]
 
@@ -52,7 +52,7 @@ class ShareForm:
 
 
 def search_share_form(
-    component: FamilyComponent, shares: Sequence[Fraction], known: Sequence[FamilyFunction] = ()
+    component: FamilyComponent, shares: Sequence[Fraction], known: Sequence[CommonForm] = ()
 ) -> ShareForm | None:
     """Search and prove a form with a large mean of its rates; None where nothing was found.
 
@@ -71,14 +71,14 @@ def search_share_form(
     if component.nodes.size > EXACT_NODES:
         return None
     try:
-        quotient = Quotient(component.family)
+        quotient = Quotient(component.family, component.kernel)
     except HypothesisError:
         return None
     camps = len(quotient.pivots) == 1 and component.gauge is not None
     if not (camps or not quotient.pivots) or not within_reach(quotient):
         return None
     try:
-        search = search_family(quotient, ("diagonal", "full"), shares=[float(s) for s in shares])
+        search = search_common_forms(quotient, ("diagonal", "full"), shares=[float(s) for s in shares])
     except OutOfTime:
         raise
     except LMIError:

@@ -24,7 +24,7 @@ import numpy as np
 from lmi.search_time import checkpoint
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.size_limits import EXACT_NODES
-from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends, prove_margin_about, with_constants
+from ptcc_certify.lyapunov.common_forms import CommonForm, prove_ends, prove_margin_about, with_constants
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.lemmas import solve_exact
 from ptcc_certify.theorems.matrix_arithmetic import Matrix
@@ -32,7 +32,7 @@ from ptcc_certify.theorems.matrix_arithmetic import Matrix
 Vector = tuple[Fraction, ...]
 
 
-def undirected_function(quotient: Quotient) -> FamilyFunction | None:
+def undirected_function(quotient: Quotient) -> CommonForm | None:
     """Return the function of the module, proved; None if no common left vector is found.
 
     Nor is one tried above 120 nodes, or where nothing moves.
@@ -69,10 +69,9 @@ def undirected_function(quotient: Quotient) -> FamilyFunction | None:
     if not moving:
         return None
     optimal = symmetric[min(moving, key=lambda i: rates[i])]
-    function = FamilyFunction(
+    function = CommonForm(
         "undirected",
-        quotient.pivots,
-        quotient.nodes,
+        quotient,
         P,
         tuple(rates),
         ((),) * len(rates),
@@ -81,7 +80,7 @@ def undirected_function(quotient: Quotient) -> FamilyFunction | None:
         optimal=optimal,
         numerical_rate=min(numerical),
     )
-    return with_constants(function, quotient)
+    return with_constants(function)
 
 
 def common_left_vector(family: Family) -> Vector | None:

@@ -37,11 +37,11 @@ from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.structure import weak_components
-from ptcc_certify.lyapunov.family_function import FamilyFunction
-from ptcc_certify.lyapunov.family_rows import FollowerDecay, follower_decays, follower_nodes
-from ptcc_certify.lyapunov.family_search import search_family
+from ptcc_certify.lyapunov.common_form_search import search_common_forms
+from ptcc_certify.lyapunov.common_forms import CommonForm
 from ptcc_certify.lyapunov.interval_rows import IntervalRows, least_quotient
 from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.row_decay import FollowerDecay, follower_decays, follower_nodes
 from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
 from ptcc_certify.theorems.family_kernel import UNKNOWN, Kernel, TooLarge
 
@@ -64,16 +64,14 @@ class LeadingPart:
     ----------
     agents : (n,) int array
         In the component, ascending. Nobody outside is heard.
-    quotient : Quotient
-        Of the family on them; its nodes are numbered within them.
-    function : FamilyFunction
+    function : CommonForm
+        Of the family on them; nodes are numbered within them.
     times : Fraction
         ``t``.
     """
 
     agents: np.ndarray
-    quotient: Quotient
-    function: FamilyFunction
+    function: CommonForm
     times: Fraction
 
     @property
@@ -91,7 +89,7 @@ class LeadingPart:
     def speeds(self) -> dict[int, Fraction]:
         """``q_p``, rounded up, of the pivots, by their numbers in the component."""
         constants = self.function.input_constants
-        return {int(self.agents[p]): self.times * root_above(constants[p]) for p in self.quotient.pivots}
+        return {int(self.agents[p]): self.times * root_above(constants[p]) for p in self.function.quotient.pivots}
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +147,7 @@ class FollowerFunction:
         sums = rows.largest_sums(np.concatenate([self.vector, self.outside])).tolist()
         result: list[Scaled] = [(dict(zip(self.followers.tolist(), sums, strict=True)), rows.unit)]
         for part in self.parts:
-            vector, unit = part.function.speeds
+            ((vector, unit),) = part.function.speeds
             result.append((dict(zip(part.agents.tolist(), vector.values(), strict=True)), unit * part.times))
         return [*result, (dict.fromkeys(rest.difference(*(vector for vector, _ in result)), 0), Fraction(1))]
 
@@ -165,8 +163,7 @@ class FollowerFunction:
         largest = -least_quotient(-abs(state[self.followers] - self._targets(state)), d)
         roots = [largest / scale]
         for part in self.parts:
-            own = part.quotient.coordinates([x[v] for v in part.agents.tolist()])
-            roots.append(root_above(part.function.value(own)) / part.times)
+            roots.append(part.function.root([x[v] for v in part.agents.tolist()]) / part.times)
         return rounded(max(roots), ROOT_BITS, up=True)
 
     def largest(self, sizes: Mapping[int, Fraction]) -> Fraction:
@@ -177,7 +174,7 @@ class FollowerFunction:
         squares = [(largest / scale) ** 2]
         for part in self.parts:
             own = dict(enumerate(sizes[v] for v in part.agents.tolist()))
-            squares.append(part.function.largest(part.quotient.coordinate_sizes(own)) / part.times**2)
+            squares.append(part.function.largest(own) / part.times**2)
         return rounded(max(squares), ROOT_BITS, up=True)
 
     def _targets(self, state: np.ndarray, sizes: bool = False) -> np.ndarray:
@@ -242,10 +239,10 @@ def _leading_parts(family: Family, followers: np.ndarray) -> list[LeadingPart] |
             quotient = Quotient.of(component)
         except (HypothesisError, TooLarge):
             return None
-        functions = search_family(quotient).functions
+        functions = search_common_forms(quotient).functions
         if not functions or functions[0].rate <= 0:
             return None
-        parts.append(LeadingPart(rest[own], quotient, functions[0], Fraction(1)))
+        parts.append(LeadingPart(rest[own], functions[0], Fraction(1)))
     return parts
 
 
@@ -279,7 +276,7 @@ def _compose(
         least = min((times * bound for part in parts for bound in part.bounds.values() if bound), default=Fraction(1))
         up = max(0, _BITS - (least.numerator.bit_length() - least.denominator.bit_length()))
         d, times = d << up, times * 2**up
-        parts = [LeadingPart(p.agents, p.quotient, p.function, times) for p in parts]
+        parts = [LeadingPart(p.agents, p.function, times) for p in parts]
         for part in parts:
             for v, end in part.ends.items():
                 outside[place[v]] = int(end)

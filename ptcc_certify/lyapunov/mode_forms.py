@@ -27,8 +27,8 @@ from lmi.search_time import checkpoint
 from lmi.switched import SwitchedCertificate, switched_lyapunov
 from lmi.uncertain_matrix import UncertainMatrix
 from ptcc_certify.graphs.family import Family
+from ptcc_certify.lyapunov.common_forms import CommonForm, prove_ends, prove_mode, with_constants
 from ptcc_certify.lyapunov.error_system import rounded_matrix
-from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends, prove_mode, with_constants
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.matrix_arithmetic import Matrix
 
@@ -48,7 +48,7 @@ class ModeForms:
     rates : tuple of Fraction
         Of each mode with its own matrix, per unit of the stretched clock.
     multipliers : tuple of tuples of Fraction
-        As those of :class:`~ptcc_certify.lyapunov.family_function.FamilyFunction`.
+        As those of :class:`~ptcc_certify.lyapunov.common_forms.CommonForm`.
     ratio : Fraction
         ``P_j <= ratio P_i`` for all modes; at least 1.
     """
@@ -70,7 +70,7 @@ def within_reach(quotient: Quotient) -> bool:
     return 0 < rows <= ROWS and modes <= MODES and rows * modes <= ALL_ROWS
 
 
-def mode_functions(quotient: Quotient, forms: ModeForms) -> list[tuple[Quotient, FamilyFunction]]:
+def mode_functions(quotient: Quotient, forms: ModeForms) -> list[CommonForm]:
     """Return the form of each mode as a function of this mode alone, with the constants of its inputs.
 
     Examples
@@ -78,7 +78,7 @@ def mode_functions(quotient: Quotient, forms: ModeForms) -> list[tuple[Quotient,
     >>> from ptcc_certify.graphs.family import Family
     >>> day, night = SignedDigraph.from_edges([("a", "b", 3)]), SignedDigraph.from_edges([("a", "b", 1)])
     >>> quotient = Quotient(Family.switching([day, night]))
-    >>> [round(float(V.rate), 3) for _, V in mode_functions(quotient, search_single_forms(quotient))]
+    >>> [round(float(V.rate), 3) for V in mode_functions(quotient, search_single_forms(quotient))]
     [6.0, 2.0]
     """
     result = []
@@ -86,12 +86,11 @@ def mode_functions(quotient: Quotient, forms: ModeForms) -> list[tuple[Quotient,
     for mode, matrix, rate, multipliers in parts:
         alone, ends = Quotient(Family((mode,)), quotient.kernel), prove_ends(matrix)
         assert ends is not None, "the forms are proved definite"
-        V = FamilyFunction("full", quotient.pivots, quotient.nodes, matrix, (rate,), (multipliers,), *ends)
-        result.append((alone, with_constants(V, alone)))
+        result.append(with_constants(CommonForm("full", alone, matrix, (rate,), (multipliers,), *ends)))
     return result
 
 
-def search_mode_forms(quotient: Quotient, price: float, known: Sequence[FamilyFunction] = ()) -> ModeForms | None:
+def search_mode_forms(quotient: Quotient, price: float, known: Sequence[CommonForm] = ()) -> ModeForms | None:
     """Search and prove forms with a large least rate minus ``price ln(ratio)``; None if nothing was proved.
 
     Parameters
@@ -99,7 +98,7 @@ def search_mode_forms(quotient: Quotient, price: float, known: Sequence[FamilyFu
     quotient : Quotient
     price : float
         Switches per unit of the stretched clock.
-    known : sequence of FamilyFunction
+    known : sequence of CommonForm
         What was proved for every signal: where the search begins.
 
     Examples
@@ -148,7 +147,7 @@ def search_single_forms(quotient: Quotient) -> ModeForms | None:
     return prove_mode_forms(quotient, certificate, ratios=False)
 
 
-def _start(modes: Sequence[UncertainMatrix], known: Sequence[FamilyFunction]) -> CommonCertificate | None:
+def _start(modes: Sequence[UncertainMatrix], known: Sequence[CommonForm]) -> CommonCertificate | None:
     """Return the best of the functions that were proved, as the search takes it; None if none has all multipliers."""
     sizes = [mode.radii.size for mode in modes]
     full = [V for V in known if not any(sizes) or [len(tau) for tau in V.multipliers] == sizes]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import Any
 
 from ptcc_certify.checker.input_formulas import Limits
@@ -15,7 +16,7 @@ from ptcc_certify.model.base import Protocol
 from ptcc_certify.model.constrained_switching import SignalClass
 from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.initial_state import InitialState
-from ptcc_certify.model.late_messages import AtOnce, LateMessages
+from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.parameters import parameter
 
@@ -74,6 +75,10 @@ class Case:
             if (value := getattr(self, name)) is not None and not isinstance(value, kind):
                 mend = f"give {kind.__name__}({example}), say"
                 raise ParameterError(name, f"= {shorten(repr(value))} is none; {mend}")
+        if self.messages is not None and self.messages.leaders not in (None, self.leaders):
+            if self.leaders is not None:
+                raise ParameterError("leaders", "is given twice, beside the messages and by them; leave one out")
+            object.__setattr__(self, "leaders", self.messages.leaders)
         for entry in limits:
             if not isinstance(entry, Limits):
                 raise ParameterError(f"limits holds {shorten(repr(entry))}; give GainLimits(gain_cap=50), say")
@@ -102,21 +107,26 @@ class Case:
             return replace(self, agents=None)
         return self if self.sliding else replace(self, agents=None, limits=self.limits_with(self.agents))
 
-    def with_rows(self) -> Case:
+    def with_rows(self, of_family: bool = False) -> Case:
         """Return the case with all that is asked beside late messages and moving leaders told as part of these.
 
         Disturbances are those of the followers of leaders, which may rest; noise within NU is an error of values of 2
-        NU; and leaders of which nothing is heard late send :class:`AtOnce` messages, with a cap of the gain alone.
+        NU; what moves or disturbs is told by messages, of which nothing need be late then. Of one graph both are judged
+        otherwise where neither messages are late nor leaders move.
 
         Examples
         --------
         >>> noisy = Asks(noise="0.1", delta=1)
         >>> case = Case("fig1a", NominalProtocol(), messages=LateMessages("0.01"), asks=noisy).with_rows()
         >>> case.messages, case.leaders, case.asks.noise, case.asks.delta
-        (LateMessages(delay=1/100, value_error=1/5), MovingLeaders(speed=0, disturbance=1), None, None)
+        (LateMessages(delay=1/100, value_error=1/5, leaders=MovingLeaders(speed=0, disturbance=1)), \
+MovingLeaders(speed=0, disturbance=1), None, None)
         """
         messages, leaders, asks = self.messages, self.leaders, self.asks
-        if (messages is None and leaders is None) or self.sliding:
+        of_order_n = isinstance(self.agents, Agents) and not self.agents.of_paper  # who take neither, and are refused
+        limits, cap, error = self.limits, self._only_cap, Fraction(0)
+        more = of_family and (asks.delta is not None or asks.noise is not None or cap is not None)
+        if not (messages is not None or leaders is not None or more) or self.sliding or of_order_n:
             return self
         if asks.delta is not None and (leaders is None or not leaders.disturbance):
             speed, sign = (0, None) if leaders is None else (leaders.speed, leaders.sign_gain)
@@ -124,18 +134,26 @@ class Case:
             leaders, asks = MovingLeaders(speed, delta, sign), replace(asks, delta=None)
         if leaders is not None and not leaders.total and leaders.sign_gain is None:
             leaders = None  # they rest, and nothing disturbs anybody
+        if asks.noise is not None and (messages is not None or leaders is not None or of_family):
+            error, asks = 2 * parameter("noise", asks.noise), replace(asks, noise=None)
+        if of_family and cap is not None and messages is None and leaders is None and not error:
+            leaders = MovingLeaders(speed=0)  # whom followers settle behind, but for what a cap leaves
+        if messages is None and ((leaders is None and not error) or (limits and cap is None)):
+            return replace(self, leaders=leaders, asks=asks)  # nothing is left to tell, or limits that are refused
+        if messages is None:
+            messages = LateMessages(value_error=error, leaders=leaders)
+        else:
+            messages = replace(messages, value_error=messages.value_error + error, leaders=leaders)
+        if cap is not None and messages.gain_cap is None:
+            messages, limits = replace(messages, gain_cap=cap), ()
+        return replace(self, messages=messages, leaders=leaders, asks=asks, limits=limits)
+
+    @property
+    def _only_cap(self) -> Fraction | None:
+        """The cap that all limits of the gain are, if there is one, and they are nothing else."""
         caps = {entry.gain_cap for entry in self.limits}
         alone = all(entry.stop_before is None and entry.sample_period is None for entry in self.limits)
-        limits = self.limits
-        if len(caps) < 2 and alone and leaders is not None and messages is None:
-            messages, limits = AtOnce(gain_cap=next(iter(caps), None)), ()
-        elif len(caps) == 1 and alone and messages is not None and messages.gain_cap is None:
-            messages, limits = replace(messages, gain_cap=next(iter(caps))), ()
-        if asks.noise is not None and messages is not None:
-            error = messages.value_error + 2 * parameter("noise", asks.noise)
-            told: dict[str, Any] = {part.name: getattr(messages, part.name) for part in fields(messages) if part.init}
-            messages, asks = LateMessages(**told | {"value_error": error}), replace(asks, noise=None)
-        return replace(self, messages=messages, leaders=leaders, asks=asks, limits=limits)
+        return next(iter(caps)) if alone and len(caps) == 1 else None
 
     def limits_with(self, agents: Agents) -> tuple[Limits, ...]:
         """Return the limits of the gain with the cap of agents, if they have one."""

@@ -41,8 +41,3 @@ class InitialState:
     )
     v0: Any = option("--v0 STATE", "Agents: initial velocities, like --x0.", key="agents.v0", example='"0"', shown="0")
     derivatives: Any = None
-
-
-def read_initial(x0: Any) -> InitialState:
-    """Return where agents begin, of whom the states alone may be given."""
-    return x0 if isinstance(x0, InitialState) else InitialState(x0)

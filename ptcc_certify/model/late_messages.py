@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.graphs.structure import Structure
+    from ptcc_certify.model.moving_leaders import MovingLeaders
     from ptcc_certify.model.virtual_positions import Vehicles
 
 #: Most losses in a row.
@@ -52,6 +53,8 @@ class LateMessages:
         The gain is at most this, 1/time/weight; ``own_delay`` asks for it.
     vehicles : Vehicles, optional
         Double integrators that exchange virtual states, and track these; then nothing need be late, lost or rounded.
+    leaders : MovingLeaders, optional
+        Of which these are heard, and what disturbs their followers; then nothing need be late, lost or rounded, either.
 
     Raises
     ------
@@ -77,8 +80,6 @@ lambda of L, or measure the own state without delay
     """
 
     section: ClassVar = "messages"
-    #: Whether something must be late, lost or rounded.
-    flawed: ClassVar = True
     delay: Exact | Mapping[tuple[str, str], Exact] = option(
         "--delay D|COLUMN",
         "What agents hear is up to D late; or the column of the edge list that tells the delay of every edge.",
@@ -114,6 +115,7 @@ lambda of L, or measure the own state without delay
     )
     gain_cap: Given = Given()
     vehicles: Vehicles | None = None
+    leaders: MovingLeaders | None = None
     _of_graph: tuple[SignedDigraph | Family, tuple[Fraction, ...]] | None = field(
         default=None, init=False, repr=False, compare=False
     )
@@ -146,7 +148,7 @@ lambda of L, or measure the own state without delay
         if self.vehicles is not None and not hasattr(self.vehicles, "v0"):
             what = f"= {shorten(repr(self.vehicles))} are none"
             raise ParameterError("vehicles", f'{what}; ask for Agents(order=2, exchange="virtual") instead')
-        if self.flawed and self.exact and self.vehicles is None:
+        if self.exact and self.vehicles is None and self.leaders is None:
             raise ParameterError(
                 "messages that are neither late, nor lost, nor rounded; give delay, period or value_error above 0"
             )
@@ -171,6 +173,11 @@ lambda of L, or measure the own state without delay
     def exact(self) -> bool:
         """Whether nothing is late, lost or rounded."""
         return not self.age and not self.value_error
+
+    @property
+    def tracks(self) -> bool:
+        """Whether nothing is late, lost or rounded, and leaders move or followers are disturbed."""
+        return self.exact and self.leaders is not None and self.vehicles is None
 
     @property
     def flaws(self) -> tuple[str, ...]:
@@ -234,7 +241,7 @@ lambda of L, or measure the own state without delay
         return tuple(none if x is None else x for x in found)
 
     def __repr__(self) -> str:
-        fields = [f"delay={readable(self.largest_delay)}"]
+        fields = [f"delay={readable(self.largest_delay)}"] if self.largest_delay or not self.tracks else []
         if self.period is not None:
             fields.append(f"period={readable(self.period)}, losses={self.losses}")
         if self.value_error:
@@ -243,22 +250,9 @@ lambda of L, or measure the own state without delay
             fields.append("own_delay=True")
         if self.gain_cap is not None:
             fields.append(f"gain_cap={readable(self.gain_cap)}")
+        if self.leaders is not None:
+            fields.append(f"leaders={self.leaders!r}")
         return f"LateMessages({', '.join(fields)})"
-
-
-class AtOnce(LateMessages):
-    """Messages that are neither late, nor lost, nor rounded, of which leaders that move are heard.
-
-    Examples
-    --------
-    >>> AtOnce(gain_cap=9)
-    AtOnce(gain_cap=9)
-    """
-
-    flawed: ClassVar = False
-
-    def __repr__(self) -> str:
-        return f"AtOnce({'' if self.gain_cap is None else f'gain_cap={readable(self.gain_cap)}'})"
 
 
 def _read(delays: Mapping[Any, Any]) -> dict[Any, Fraction]:

@@ -141,7 +141,9 @@ it out
 
 def asked_of_single_integrators(case: Case) -> list[str]:
     """Return what is asked of single integrators alone."""
-    return [name for name in _NOT_OF_AGENTS if case.given(name) is not None]
+    given = [name for name in _NOT_OF_AGENTS if case.given(name) is not None]
+    alone = case.messages is not None and case.messages.tracks  # which nobody asked for beside leaders
+    return [name for name in given if name != "messages" or not alone]
 
 
 def _entries(values: Any) -> list[Any]:
@@ -170,9 +172,11 @@ def refuse_beside(structure: Structure, case: Case) -> None:
     _refuse_beside_any_graph(case)
     if messages is None and leaders is None:
         return
-    late = messages is not None and (messages.flawed or messages.vehicles is not None)
+    late = messages is not None and not messages.tracks
     _refuse_more(_NOT_LATE if late else _NOT_TRACKING, case)
     if leaders is not None:
+        if messages is None or messages.leaders is None:
+            raise ParameterError("leaders", "that move are not certified of these agents; leave them out")
         what = "leaders that move as they like" if leaders.speed else "disturbances where messages are late"
         refuse_leader_groups(structure, f"{what}: a bound")
     if messages is not None:

@@ -16,8 +16,7 @@ from typing import Any
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.fact import Fact
 from ptcc_certify.errors import PTCCError
-from ptcc_certify.gain_design.agents_answer import AgentsDesign
-from ptcc_certify.gain_design.answer import Design
+from ptcc_certify.gain_design.answer import AgentsDesign, Design
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.size_limits import SHOWN_NODES

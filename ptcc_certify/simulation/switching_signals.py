@@ -26,8 +26,7 @@ from ptcc_certify.simulation.member_laplacians import MIDDLE, Choice, Members
 from ptcc_certify.theorems.family_behaviour import decide
 
 if TYPE_CHECKING:
-    from ptcc_certify.lyapunov.family_function import FamilyFunction
-    from ptcc_certify.lyapunov.quotient import Quotient
+    from ptcc_certify.lyapunov.common_forms import CommonForm
 
 #: How random weights lie in their intervals.
 WEIGHTS = ("both", "ends", "between")
@@ -331,21 +330,19 @@ class WorstCaseSignal(Signal):
         self.text = "worst case" + (" for a Lyapunov function" if form is not None else "")
 
     @classmethod
-    def against(
-        cls, function: FamilyFunction, quotient: Quotient, nodes: np.ndarray, n: int, step: float | None = None
-    ) -> WorstCaseSignal:
+    def against(cls, function: CommonForm, nodes: np.ndarray, n: int, step: float | None = None) -> WorstCaseSignal:
         """Return the search against a Lyapunov function of a component.
 
         Parameters
         ----------
-        function : FamilyFunction
-        quotient : Quotient
+        function : CommonForm
             Of the component.
         nodes : (m,) int array
             The nodes of the component, among ``n``.
         n : int
         step : float, optional
         """
+        quotient = function.quotient
         C = np.zeros((len(quotient.nodes), n))
         for row, v in enumerate(quotient.nodes):
             C[row, nodes[v]] = 1

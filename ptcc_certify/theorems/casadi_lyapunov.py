@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.sparse import csc_matrix
 
-from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.lyapunov.function import LyapunovFunction
-from ptcc_certify.model import Protocol, SlidingModeProtocol
+from ptcc_certify.model import Protocol
 from ptcc_certify.model.casadi_latex import to_latex
 from ptcc_certify.theorems.table import theorem_for
 
@@ -165,90 +164,4 @@ def symbolic_lyapunov(structure: Any, V: LyapunovFunction, protocol: Protocol) -
         V_dot=ca.jtimes(value, x, loop["ode"]),
         proof_form=-gain * ca.bilin(decrease, z, z),
         bounding_form=-gain * ca.bilin(S, z, z),
-    )
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class SymbolicSliding:
-    """Proposition 1 along the closed loop, symbolically.
-
-    Attributes
-    ----------
-    protocol : SlidingModeProtocol
-    t, x, varsigma, d : casadi.SX
-        The instant, in units of time; states, auxiliary variables and disturbances, (N, 1) each.
-    sigma : (N, 1) casadi.SX
-        ``x + varsigma``.
-    V : casadi.SX
-        ``sigma'sigma / 2``.
-    V_dot : casadi.SX
-        By CasADi's differentiation of ``V`` along the closed loop.
-    bounding_form : casadi.SX
-        ``-(mu1 - delta) sum |sigma_k| - (reaching gain) sigma'sigma``, above ``V_dot`` for every ``|d_k| <= delta``.
-
-    References
-    ----------
-    Proposition 1 of [Zhu]_.
-
-    Examples
-    --------
-    >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
-    >>> form = symbolic_sliding(SignedDigraph.from_edges([(1, 2, 4)]), p)
-    >>> import casadi as ca
-    >>> float(ca.substitute(form.V, ca.vertcat(form.x, form.varsigma), ca.DM([1, 2, 0, -4])))  # sigma = (1, -2)
-    2.5
-    """
-
-    protocol: SlidingModeProtocol
-    t: ca.SX
-    x: ca.SX
-    varsigma: ca.SX
-    d: ca.SX
-    sigma: ca.SX
-    V: ca.SX
-    V_dot: ca.SX
-    bounding_form: ca.SX
-
-    def __repr__(self) -> str:
-        return f"SymbolicSliding({self.x.numel()} agents)"
-
-
-def symbolic_sliding(graph: Any, protocol: SlidingModeProtocol) -> SymbolicSliding:
-    """Write ``sigma``, ``V`` and ``V'`` of Proposition 1 as CasADi expressions.
-
-    Parameters
-    ----------
-    graph : graph-like
-        N agents.
-    protocol : SlidingModeProtocol
-
-    Returns
-    -------
-    SymbolicSliding
-
-    Examples
-    --------
-    >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
-    >>> form = symbolic_sliding(SignedDigraph.from_edges([(1, 2, 4)]), p)
-    >>> form.sigma
-    SX([(x1+varsigma1), (x2+varsigma2)])
-    """
-    import casadi as ca
-
-    graph = as_graph(graph)
-    loop, n = protocol.closed_loop(graph), graph.n_nodes
-    t, x, varsigma = loop["t"], loop["x"][:n], loop["x"][n:]
-    sigma = x + varsigma
-    value = ca.sumsqr(sigma) / 2
-    reach = float(protocol.mu1 - protocol.delta) * ca.sum1(ca.fabs(sigma))
-    return SymbolicSliding(
-        protocol=protocol,
-        t=t,
-        x=x,
-        varsigma=varsigma,
-        d=loop["p"],
-        sigma=sigma,
-        V=value,
-        V_dot=ca.jtimes(value, loop["x"], loop["ode"]),
-        bounding_form=-reach - protocol.reaching_gain.expression(t) * ca.sumsqr(sigma),
     )

@@ -37,7 +37,7 @@ def bounds(graph: SignedDigraph, delay: object, own: bool, x0: list[Fraction] | 
 
 
 def small_delays(cert: Certificate, probe: LateMessages) -> SmallDelayBounds:
-    known = cert.initial_state, None, None, cert.influence, cert.decaying_forms
+    known = cert.initial_state, None, cert.influence, cert.decaying_forms
     return SmallDelayBounds(LateCase(cert.structure, PROTOCOL, probe, *known))
 
 
@@ -79,7 +79,7 @@ def test_the_longest_delay_for_a_wanted_residual_is_sought_by_it_too() -> None:
     cert = certify_words(TEAM, PROTOCOL, start, simulation=False)
     ends = None if cert.final_state is None else cert.final_state.intervals
     messages, parts = LateMessages("0.0001", own_delay=True, gain_cap=CAP), (cert.influence, cert.decaying_forms)
-    late = bound_case(LateCase(graph, PROTOCOL, messages, cert.initial_state, ends, None, *parts))
+    late = bound_case(LateCase(graph, PROTOCOL, messages, cert.initial_state, ends, *parts))
     longest = longest_delay(late, Fraction(1))
     assert longest is not None and longest.lmi is not None and longest.form is None
     assert longest.largest <= 1

@@ -24,9 +24,9 @@ from ptcc_certify.bounds.final_state.attracting_box import attracting_box, invar
 from ptcc_certify.bounds.final_state.of_family import final_value, value_ends, weighted_mean_interval
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.lyapunov.family_rows import follower_decay
-from ptcc_certify.lyapunov.family_search import search_family
+from ptcc_certify.lyapunov.common_form_search import search_common_forms
 from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.row_decay import follower_decay
 from ptcc_certify.theorems.family_behaviour import decide
 
 # ---------------------------------------------------------------------- constant weights
@@ -109,7 +109,7 @@ def test_weighted_means_enclose_the_values_of_random_signals():
         family = random_consensus(rng)
         (component,) = decide(family)
         quotient = Quotient.of(component)
-        functions = search_family(quotient, kinds=("undirected", "diagonal")).functions if quotient.nodes else ()
+        functions = search_common_forms(quotient, kinds=("undirected", "diagonal")).functions if quotient.nodes else ()
         if not functions or functions[0].rate <= 0:
             continue
         x = random_state(rng, family.n_nodes)
@@ -127,7 +127,7 @@ def test_weighted_means_enclose_the_values_of_random_signals():
 def test_the_mean_of_undirected_graphs_is_exact_for_every_signal():
     family = Family.from_intervals([("a", "b", 1, 5), ("b", "c", 0, 5), ("a", "c", 1, 2)], undirected=True)
     quotient = Quotient.of(decide(family)[0])
-    function = search_family(quotient).functions[0]
+    function = search_common_forms(quotient).functions[0]
     third = Fraction(1, 3)
     x = [Fraction(1), Fraction(2), Fraction(6)]
     assert weighted_mean_interval(quotient, function, (1, 1, 1), x, (third,) * 3) == (Fraction(3), Fraction(3))

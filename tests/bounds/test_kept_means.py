@@ -19,7 +19,7 @@ from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_proof import ComponentProof
 from ptcc_certify.checker import check, digest
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.lyapunov.family_function import FamilyFunction
+from ptcc_certify.lyapunov.common_forms import CommonForm
 from ptcc_certify.theorems.family_behaviour import decide
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
@@ -161,8 +161,8 @@ def test_weights_known_to_a_part_leave_the_mean_nearly_kept():
     assert "of an input or a mean" in str(answer(data))
 
 
-def stripped(part: ComponentProof) -> tuple[FamilyFunction, ...]:
-    return tuple(replace(V, means=()) for V in part.functions if isinstance(V, FamilyFunction))
+def stripped(part: ComponentProof) -> tuple[CommonForm, ...]:
+    return tuple(replace(V, means=()) for V in part.functions if isinstance(V, CommonForm))
 
 
 @pytest.mark.parametrize(

@@ -22,9 +22,10 @@ from ptcc_certify.errors import HypothesisError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, pairs_of
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.lyapunov.late_follower_rows import FollowerRows
+from ptcc_certify.lyapunov.follower_rows import FollowerRows
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.asks import Asks, Expectations
+from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.report.page import report_html
@@ -227,6 +228,12 @@ BESIDE: dict[str, dict[str, Any]] = {
     },
     "leaders that move": {"leaders": MovingLeaders(speed="0.5")},
     "leaders that move, followed with a sign term": {"leaders": MovingLeaders(speed="0.5", sign_gain=1)},
+    "a cap": {"limits": GainLimits(gain_cap=20)},
+    "disturbances": {"asks": Asks(delta="0.1")},
+    "noise and disturbances under a cap": {
+        "asks": Asks(delta="0.1", noise="0.01"),
+        "limits": GainLimits(gain_cap=20),
+    },
 }
 
 
@@ -235,7 +242,7 @@ def certified(name: str, x0: tuple[int, ...] | None = (1, 2, -3)) -> Certificate
     return certify(UNSURE, PROTOCOL, x0, **BESIDE[name])  # type: ignore[no-any-return]
 
 
-@pytest.mark.few(6)
+@pytest.mark.few(9)
 @pytest.mark.parametrize("x0", [(1, 2, -3), None], ids=["state", "every state"])
 @pytest.mark.parametrize("name", BESIDE)
 def test_what_is_certified_is_read_back(name: str, x0: tuple[int, ...] | None, tmp_path: Path):
@@ -250,6 +257,40 @@ def test_what_is_certified_is_read_back(name: str, x0: tuple[int, ...] | None, t
         assert found.late.largest == pytest.approx(made.late.largest) and found.late.relative == (x0 is None)
         t = np.linspace(0, 1, 11)
         assert found.late.deviation_bound(t) == pytest.approx(made.late.deviation_bound(t))
+
+
+def test_what_a_cap_leaves_bounds_runs_of_members():
+    made, runs = certified("a cap"), []
+    for member in ([(0, 1, 1), (1, 2, -3), (2, 1, "-0.5"), (0, 2, -1)], [(0, 1, 2), (1, 2, -1), (0, 2, -1)]):
+        run = ptcc.simulate(SignedDigraph.from_edges(member), PROTOCOL, [1, 2, -3], actuator=GainLimits(gain_cap=20))
+        runs.append(np.abs(run.final_state - np.array([1, 1, -1])).max())
+        assert np.all(np.abs(run.input).max(axis=1)[1:] <= made.late.inputs.max())
+    assert 0.05 * made.late.largest < max(runs) <= made.late.largest
+
+
+def test_disturbances_and_noise_of_a_family_are_those_of_followers_and_of_what_is_heard():
+    limits, asks = GainLimits(gain_cap=20), Asks(delta="0.1", noise="0.01")
+    noisy = certify(UNSURE, PROTOCOL, [1, 2, -3], limits=limits, asks=asks)
+    inexact = LateMessages(value_error="0.02", gain_cap=20, leaders=MovingLeaders(speed=0, disturbance="0.1"))
+    plain = certify(UNSURE, PROTOCOL, [1, 2, -3], messages=inexact)
+    assert noisy.late is not None and noisy.document["digest"] == plain.document["digest"]
+    assert 0.02 < noisy.late.largest < 0.2 and noisy.assessment.exit_code == 0
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"limits": GainLimits(stop_before="0.1")},
+        {"limits": GainLimits(gain_cap=9, sample_period="0.1")},
+        {"limits": (GainLimits(gain_cap=9), GainLimits(gain_cap=8)), "asks": Asks(noise=1)},
+        {"limits": GainLimits(stop_before="0.1"), "asks": Asks(delta=1)},
+    ],
+)
+def test_other_limits_of_families_are_refused(more: dict[str, Any]):
+    with pytest.raises(ParameterError, match="limits is not for families of graphs yet"):
+        certify(UNSURE, PROTOCOL, [1, 2, -3], **more)
+    with pytest.raises(HypothesisError, match="leads and hears others"):
+        certify(Family.from_intervals([(1, 2, 1, 2), (2, 1, 1, 2)]), PROTOCOL, limits=GainLimits(gain_cap=9))
 
 
 def test_a_delay_that_is_not_forgiven_is_left_open_and_read_back(tmp_path: Path):

@@ -34,10 +34,11 @@ from ptcc_certify.checker.input_formulas import PrescribedGain, drift_above, gai
 from ptcc_certify.errors import HypothesisError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure, analyse
-from ptcc_certify.lyapunov.late_follower_rows import FollowerRows
+from ptcc_certify.lyapunov.follower_rows import FollowerRows
 from ptcc_certify.model import NominalProtocol
 from ptcc_certify.model.asks import Asks, Expectations
-from ptcc_certify.model.late_messages import AtOnce, LateMessages
+from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.simulation.late_messages import PATTERNS, simulate_late
 from ptcc_certify.simulation.moving_leaders import simulate_tracking
@@ -397,7 +398,7 @@ def tracked(
     **cap: Any,
 ) -> LateBounds:
     """What is proved of followers that hear at once of leaders that move."""
-    return bound_late(LateCase(structure, protocol, AtOnce(**cap), x0, ends, leaders))
+    return bound_late(LateCase(structure, protocol, LateMessages(**cap, leaders=leaders), x0, ends))
 
 
 def _judge_tracking(seed: int) -> tuple[float, float]:
@@ -615,7 +616,7 @@ def _flight_ratio(seed: int, pattern: int, apart: bool = False) -> tuple[float, 
     The motion is that of the tests, which knows nothing of the package.
     """
     structure, protocol, messages, leaders, x0, ends = _both(seed, apart)
-    bounds = bound_late(LateCase(structure, protocol, messages, x0, ends.intervals, leaders))
+    bounds = bound_late(LateCase(structure, protocol, replace(messages, leaders=leaders), x0, ends.intervals))
     graph, T, rng = structure.graph, float(protocol.T), np.random.default_rng(seed)
     W, ages = np.zeros((graph.n_nodes,) * 2), np.full((graph.n_nodes,) * 2, float(messages.age))
     W[graph.target, graph.source] = graph.weights
@@ -664,7 +665,7 @@ def test_240_graphs_whose_leaders_flee_while_messages_are_late_keep_their_bounds
 @pytest.mark.parametrize("seed", thinned(range(3000, 3012), 3))
 def test_runs_of_the_package_behind_fleeing_leaders_keep_the_bounds(seed: int) -> None:
     structure, protocol, messages, leaders, x0, ends = _both(seed)
-    bounds = bound_late(LateCase(structure, protocol, messages, x0, ends.intervals, leaders))
+    bounds = bound_late(LateCase(structure, protocol, replace(messages, leaders=leaders), x0, ends.intervals))
     pattern: Any = PATTERNS[seed % 4]
     run = simulate_late(structure.graph, protocol, messages, x0, pattern=pattern, steps=300, leaders=leaders)
     assert run.targets is not None
@@ -680,7 +681,9 @@ def test_runs_of_the_package_behind_fleeing_leaders_keep_the_bounds(seed: int) -
 def test_without_speed_and_disturbance_nothing_changes(seed: int) -> None:
     structure, protocol, messages, _, x0, ends = _both(4000 + seed, apart=seed % 2 == 0)
     still = bound_late(LateCase(structure, protocol, messages, x0, ends.intervals))
-    moving = bound_late(LateCase(structure, protocol, messages, x0, ends.intervals, MovingLeaders(speed=0)))
+    moving = bound_late(
+        LateCase(structure, protocol, replace(messages, leaders=MovingLeaders(speed=0)), x0, ends.intervals)
+    )
     assert still.residual is not None and moving.residual is not None
     np.testing.assert_array_equal(still.residual, moving.residual)
     for one, other in zip(still.rows, moving.rows, strict=False):
@@ -734,7 +737,7 @@ def test_the_drift_of_rows_is_that_of_an_equation_with_a_capped_gain() -> None:
 def test_what_no_gain_takes_away_stays_below_the_bound_and_above_nothing() -> None:
     structure = analyse(SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1), ("c", "d", -1)]))
     strong = NominalProtocol(T=1, rho1=1, rho2=60, kappa=1)
-    late = bound_late(LateCase(structure, strong, LateMessages(Fraction(1, 50)), leaders=MovingLeaders("1/2")))
+    late = bound_late(LateCase(structure, strong, LateMessages(Fraction(1, 50), leaders=MovingLeaders("1/2"))))
     assert late.never_below is not None and math.isclose(late.never_below, 0.03, rel_tol=1e-6)  # 3 links of 0.01
     assert late.never_below <= late.largest <= 1.1 * late.never_below
     assert replace(late, steps=None).never_below == late.never_below  # rows of another gain leave less than these
@@ -754,7 +757,7 @@ def test_late_messages_and_leaders_that_move_are_saved_and_read() -> None:
             made.save(Path(folder) / "c.json")
             saved = read_certificate(Path(folder) / "c.json")
         assert saved.late is not None and made.late is not None
-        assert saved.late.leaders == leaders and saved.late.messages == messages
+        assert saved.late.messages == replace(messages, leaders=leaders)
         np.testing.assert_array_equal(saved.late.residual, made.late.residual)
         assert saved.late.after == made.late.after and saved.late.never_below == made.late.never_below
         t = np.linspace(0, 1, 7)
@@ -763,7 +766,7 @@ def test_late_messages_and_leaders_that_move_are_saved_and_read() -> None:
 
 
 def test_late_messages_and_leaders_of_which_nothing_is_proved_are_read_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("ptcc_certify.certificate.graph_certification.bound_late", _nothing)
+    monkeypatch.setattr("ptcc_certify.certificate.messages_part.bound_late", _nothing)
     graph, leaders = SignedDigraph.from_edges([("a", "b", 1)]), MovingLeaders("1/2")
     protocol, messages = NominalProtocol(T=1, rho1=1, rho2=3, kappa=1), LateMessages("0.03")
     made = certify(
@@ -773,7 +776,7 @@ def test_late_messages_and_leaders_of_which_nothing_is_proved_are_read_back(monk
         made.save(Path(folder) / "c.json")
         saved = read_certificate(Path(folder) / "c.json")
     assert saved.late is not None and not saved.late.says_something
-    assert (saved.late.messages, saved.late.leaders) == (messages, leaders)
+    assert saved.late.messages == replace(messages, leaders=leaders)
 
 
 def _nothing(case: LateCase) -> LateBounds:
@@ -789,9 +792,10 @@ def test_the_longest_delay_behind_leaders_that_move_is_certified() -> None:
     made = certify_words(graph, protocol, [1, 2, 3], messages=messages, **options)
     assert made.late is not None and made.late.enough is not None and 0 < made.late.enough < Fraction(1, 5)
     assert "every follower within" in repr(made.late) and "of its target at T)" in repr(made.late)
-    structure, x0, again = made.structure, [Fraction(x) for x in (1, 2, 3)], replace(messages, delay=made.late.enough)
+    structure, x0, again = made.structure, [Fraction(x) for x in (1, 2, 3)], made.late.messages
     ends = final_state(structure, x0).intervals
-    assert bound_late(LateCase(structure, protocol, again, x0, ends, leaders)).largest <= 0.05
+    again = replace(again, delay=made.late.enough)
+    assert bound_late(LateCase(structure, protocol, again, x0, ends)).largest <= 0.05
 
 
 @pytest.mark.parametrize(("cap", "speed"), thinned([(None, None), (100, None), (None, "1/2"), (100, "1/2")], 3))
@@ -851,8 +855,8 @@ def test_after_T_the_bound_is_what_holds_there(cap: int | None) -> None:
 def test_bounds_from_instant_to_instant_are_kept_after_T_unless_leaders_move(leaders: MovingLeaders | None) -> None:
     structure = analyse(SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1)]))
     state, ends = [Fraction(x) for x in (0, 5, 1)], [(Fraction(0), Fraction(0))] * 3
-    steps = bound_late(LateCase(structure, NominalProtocol(), LateMessages("0.01"), state, ends, leaders)).steps
-    case = LateCase(structure, NominalProtocol(), LateMessages("0.01"), state, ends, leaders)
+    case = LateCase(structure, NominalProtocol(), LateMessages("0.01", leaders=leaders), state, ends)
+    steps = bound_late(case).steps
     assert steps is not None and np.isfinite(steps.deviation_bound(case, np.array([1.0]))).all()
     assert np.isfinite(steps.deviation_bound(case, np.array([1.5]))).all() == (leaders is None)
 
@@ -878,3 +882,23 @@ def test_what_inexact_values_add_is_proved_where_weights_cancel() -> None:
         asks=Asks(simulation=False, method="paper"),
     )
     assert certificate.verdict == "certified" and certificate.checked.accepted
+
+
+@pytest.mark.parametrize("limits", [GainLimits(), (GainLimits(gain_cap=9), GainLimits())])
+@pytest.mark.parametrize("beside", [{"messages": LateMessages("0.01")}, {"leaders": MovingLeaders(speed=1)}])
+def test_limits_that_limit_nothing_are_refused_beside_messages_too(limits: Any, beside: dict[str, Any]) -> None:
+    chain = SignedDigraph.from_edges([(1, 2, 1)])
+    with pytest.raises(ParameterError, match=r"limit nothing|two; give both|one gain cap alone"):
+        certify(chain, NominalProtocol(), limits=limits, **beside)
+
+
+def test_leaders_are_told_by_messages_or_beside_them() -> None:
+    chain, leaders = SignedDigraph.from_edges([(1, 2, 1)]), MovingLeaders(speed=1)
+    asks, messages = Asks(simulation=False, method="paper"), LateMessages("0.01", leaders=leaders)
+    made = certify(chain, NominalProtocol(), messages=messages, asks=asks)
+    beside = certify(chain, NominalProtocol(), messages=LateMessages("0.01"), leaders=leaders, asks=asks)
+    assert (
+        made.late is not None and made.late.leaders == leaders and made.document["digest"] == beside.document["digest"]
+    )
+    with pytest.raises(ParameterError, match="given twice"):
+        certify(chain, NominalProtocol(), messages=messages, leaders=MovingLeaders(speed=2))

@@ -17,8 +17,8 @@ from ptcc_certify.checker.matrix_products import WITH_MULTIPLIERS, need_rows_wit
 from ptcc_certify.checker.reading import RejectedError
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.lyapunov import family_search
-from ptcc_certify.lyapunov.family_search import prove_certificate
+from ptcc_certify.lyapunov import common_form_search
+from ptcc_certify.lyapunov.common_form_search import prove_certificate
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.report.screen import certificate_lines, summary_lines
 from ptcc_certify.theorems.family_behaviour import decide
@@ -114,7 +114,7 @@ def _three_uncertain_edges() -> Family:
 
 def test_no_function_is_searched_whose_proof_has_more_rows_than_the_check_takes(monkeypatch):
     """3 agents and 3 uncertain edges."""
-    monkeypatch.setattr(family_search, "WITH_MULTIPLIERS", 5)
+    monkeypatch.setattr(common_form_search, "WITH_MULTIPLIERS", 5)
     monkeypatch.setattr(family_certification, "squares_function", lambda *_: None)
     made = certify_family(_three_uncertain_edges(), PROTOCOL, [1, 2, 3])
     assert made.verdict == "certified" and made.rate is None
@@ -122,7 +122,7 @@ def test_no_function_is_searched_whose_proof_has_more_rows_than_the_check_takes(
     assert (
         "in closed form; no larger one was proved (6 agents and uncertain edges in one mode are above the rows" in text
     )
-    monkeypatch.setattr(family_search, "WITH_MULTIPLIERS", 6)
+    monkeypatch.setattr(common_form_search, "WITH_MULTIPLIERS", 6)
     assert certify_family(_three_uncertain_edges(), PROTOCOL).rate
 
 

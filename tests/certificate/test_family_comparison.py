@@ -106,7 +106,7 @@ def test_the_ratio_of_a_lyapunov_function_is_that_of_exponentials():
     run = simulate(family, PROTOCOL, [1, 2], ConstantSignal(0, 1.0), times=[0, "1/2"])
     A = Members(family).laplacian(run.played.choices[0]).toarray()
     x, ratios = expm(-A * run.clock[1]) @ [1, 2], []
-    for signal, (_, _, V) in zip(worst_case_signals(certificate), functions_of(certificate), strict=False):
+    for signal, (_, V) in zip(worst_case_signals(certificate), functions_of(certificate), strict=False):
         start = np.array([1, 2]) @ signal.form @ [1, 2]
         ratios.append(np.sqrt(x @ signal.form @ x / (np.exp(-float(V.rate) * run.clock[1]) * start)))
     assert abs(compare(certificate, run).lyapunov_ratio - max(ratios)) < 1e-6

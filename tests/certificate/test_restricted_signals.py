@@ -29,7 +29,7 @@ from ptcc_certify.certificate.verdict import assess
 from ptcc_certify.checker import check, digest
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.lyapunov.clock_shares import search_share_form
-from ptcc_certify.lyapunov.family_function import FamilyFunction
+from ptcc_certify.lyapunov.common_forms import CommonForm
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.model.asks import Expectations
 from ptcc_certify.model.constrained_switching import ClockShares, DwellTime, JointWindows
@@ -508,7 +508,7 @@ def test_a_function_for_every_signal_stands_for_shares_where_their_own_search_fi
     family, shares = slowed_by_switches(), [Fraction(1, 2), Fraction(1, 2)]
     (component,) = decide(family)
     (V, *_) = certify_family(family, PROTOCOL).parts[0].functions
-    assert isinstance(V, FamilyFunction)
+    assert isinstance(V, CommonForm)
     fast = replace(V, rates=tuple(100 * rate for rate in V.rates))
     form = search_share_form(component, shares, [fast])
     assert form is not None and form.function is fast

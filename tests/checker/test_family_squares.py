@@ -21,7 +21,7 @@ from ptcc_certify.certificate.runs_against_bounds import compare
 from ptcc_certify.checker import check
 from ptcc_certify.checker.reading import exact
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.lyapunov.family_search import FamilySearch
+from ptcc_certify.lyapunov.common_form_search import FamilySearch
 from ptcc_certify.lyapunov.squares_function import SquaresFunction
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.simulation.run import simulate
@@ -202,7 +202,7 @@ def test_a_sum_of_squares_of_agents_that_agree_is_refused():
 def test_small_families_take_it_where_the_search_finds_nothing_and_else_what_was_found(monkeypatch):
     family = random_core(0, 8, edges=2)
     found = certify_family(family, PROTOCOL)
-    monkeypatch.setattr(family_certification, "search_family", lambda *args, **keywords: FamilySearch())
+    monkeypatch.setattr(family_certification, "search_common_forms", lambda *args, **keywords: FamilySearch())
     cert = certify_family(family, PROTOCOL)
     assert [V.kind for V in cert.parts[0].functions] == ["squares"] and cert.verdict == "certified"
     assert 0 < cert.rate <= found.rate and all(V.kind != "squares" for V in found.parts[0].functions)

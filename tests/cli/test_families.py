@@ -471,9 +471,8 @@ BAD = {
             f"{flag}:? (is for one graph, not for families|belongs to)",
         )
         for flag, *value in (
-            *(("--gain-cap", "5"), ("--stop-before", "0.1"), ("--sample-period", "0.1"), ("--noise", "1")),
-            *(("--delta", "1"), ("--method", "paper"), ("--at", "0.5"), ("--initial-bound", "1"), ("--sigma0", "1")),
-            *(("--simulation",), ("--disturbance", "none")),
+            *(("--stop-before", "0.1"), ("--sample-period", "0.1"), ("--simulation",), ("--disturbance", "none")),
+            *(("--method", "paper"), ("--at", "0.5"), ("--initial-bound", "1"), ("--sigma0", "1")),
         )
     },
 }
@@ -500,7 +499,7 @@ def test_a_family_that_is_none_is_refused_in_one_line(name: str):
         ('file = "day.csv"\noptional = ["a;b"]', "s.toml: [graph] optional: a;b is no edge"),
         ('file = "day.csv"\noptional = [1]', "s.toml: [graph] optional: write a list of texts"),
         ('file = "day.csv"\nsignal = "now"', "s.toml: [graph] signal: 'now' is not one of"),
-        ('file = "unsure.csv"\n[limits]\ngain_cap = 5', "s.toml: [limits] gain_cap: is for one graph"),
+        ('file = "unsure.csv"\n[limits]\nstop_before = 0.1', "s.toml: [limits] stop_before: is for one graph"),
     ],
 )
 def test_what_is_wrong_with_the_family_of_a_scenario_is_told_by_its_key(text: str, says: str):
@@ -680,7 +679,7 @@ def test_what_the_time_limit_cut_off_of_a_family_is_a_sentence(monkeypatch: pyte
     def late(*_: object) -> None:
         raise OutOfTime("late")
 
-    monkeypatch.setattr(family_certification, "prove_family_rate_bound", late)
+    monkeypatch.setattr(family_certification, "prove_signal_rate_bound", late)
     assert "note       upper bound on the decay rate: cut off by the time limit" in ptcc("certify", *BOTH, "-v").out
 
 

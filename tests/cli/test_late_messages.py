@@ -126,7 +126,7 @@ def test_the_delay_up_to_which_a_wanted_residual_is_told_to_be_certified_is_cert
 def test_no_delay_is_told_that_the_check_does_not_accept(monkeypatch: pytest.MonkeyPatch) -> None:
     words = ("team.csv", "--delay", "0.02", "--max-residual", "0.001", *START, *QUICK)
     monkeypatch.setattr(
-        "ptcc_certify.certificate.graph_certification.longest_delay",
+        "ptcc_certify.certificate.messages_part.longest_delay",
         lambda late, _: replace(late, residual=np.zeros(4), case=replace(late.case, messages=LateMessages("0.01"))),
     )
     assert "older" not in ptcc("certify", *words).out
@@ -271,8 +271,11 @@ def test_agents_that_begin_on_their_targets_are_not_said_to_get_little_nearer(wo
             "under one gain cap alone; leave others out",
         ),
         (("team.csv", "--uncertainty", "1%", "--delay", "none"), 'no column "none"; add it, or name one of source'),
-        (("team.csv", "--uncertainty", "1%", "--delta", "1"), "--delta is for one graph, not for families yet"),
-        (("team.csv", "--uncertainty", "1%", "--gain-cap", "9"), "--gain-cap is for one graph, not for families yet"),
+        (("group.csv", "--uncertainty", "1%", "--delta", "1"), "a leads and hears others, of which nothing"),
+        (
+            ("group.csv", "--uncertainty", "1%", "--gain-cap", "9"),
+            "a leads and hears others, of which nothing",
+        ),
         (("team.csv", "--uncertainty", "1%", "--max-residual", "1"), "--max-residual is asked of late messages"),
         (("team.csv", "--delay", "1e"), "give a number in your unit of time, or the name of a column"),
         (("team.csv", "--delay", "latency"), 'team.csv, line 1: no column "latency"; add it, or name one of'),
@@ -712,7 +715,7 @@ def test_a_file_without_anything_proved_of_moving_leaders_still_says_that_they_w
     )
     made.changed(late=replace(made.late, rows=(), residual=None, input=None)).save("c.json")
     saved = read_certificate("c.json")
-    assert saved.request.leaders == leaders and not saved.late.says_something
+    assert saved.request.messages.leaders == leaders and not saved.late.says_something
     assert "left open: leaders that move" in saved.assessment.text and int(saved.assessment.exit_code) == 4
 
 

@@ -16,11 +16,9 @@ from ptcc_certify.bounds.agents.shortest_time import shortest_time
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker import check
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.gain_design import agents_shortest_deadline
-from ptcc_certify.gain_design.agents_answer import AgentsDesign
-from ptcc_certify.gain_design.agents_deadlines import TOLERANCE, Candidate, at_deadline
-from ptcc_certify.gain_design.agents_shortest_deadline import design_agents
-from ptcc_certify.gain_design.answer import INFEASIBLE, MET, UNPROVED
+from ptcc_certify.gain_design import deadline_search
+from ptcc_certify.gain_design.answer import INFEASIBLE, MET, UNPROVED, AgentsDesign
+from ptcc_certify.gain_design.deadline_search import TOLERANCE, Candidate, at_deadline, design_agents
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.agents import Agents
@@ -53,7 +51,7 @@ CASES: dict[str, tuple[Agents, Any, Fraction, dict[str, Any]]] = {
 @pytest.fixture(autouse=True)
 def _paper_functions(monkeypatch):
     """One Lyapunov function is enough for facts about deadlines; the command line's tests and the campaign use more."""
-    monkeypatch.setattr(agents_shortest_deadline, "Asks", functools.partial(Asks, method="paper"))
+    monkeypatch.setattr(deadline_search, "Asks", functools.partial(Asks, method="paper"))
 
 
 @functools.cache
@@ -94,7 +92,7 @@ def test_a_deadline_that_is_shorter_by_two_hundredths_is_not_proved_to_keep_the_
     answer = designed(name)
     assert answer.deadline is not None and answer.too_short is not None
     assert answer.too_short < answer.deadline <= answer.too_short * (1 + TOLERANCE)
-    assert not fresh(answer, answer.deadline * Fraction(98, 100), X0, CASES[name][3].get("v0")).meets(answer.asked)
+    assert not answer.asked.met_by(fresh(answer, answer.deadline * Fraction(98, 100), X0, CASES[name][3].get("v0")))
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -224,7 +222,7 @@ def test_a_protocol_with_another_deadline_keeps_its_shares():
 @pytest.mark.campaign
 @pytest.mark.parametrize("seed", range(0, 36, 3))
 def test_designs_on_random_graphs_are_accepted_minimal_and_kept_by_runs(seed: int, monkeypatch):
-    monkeypatch.setattr(agents_shortest_deadline, "Asks", Asks)
+    monkeypatch.setattr(deadline_search, "Asks", Asks)
     _, kwargs = all_classes()[seed % len(all_classes())]
     rng = np.random.default_rng(seed)
     graph = random_graph(rng, n=6, **{k: v for k, v in kwargs.items() if k != "n"}).graph
@@ -243,7 +241,7 @@ def test_designs_on_random_graphs_are_accepted_minimal_and_kept_by_runs(seed: in
 @pytest.mark.campaign
 @pytest.mark.parametrize("first", range(0, 78, 13))
 def test_designs_of_the_cascade_on_every_class_are_accepted_and_kept_by_runs(first: int, monkeypatch):
-    monkeypatch.setattr(agents_shortest_deadline, "Asks", Asks)
+    monkeypatch.setattr(deadline_search, "Asks", Asks)
     for seed in range(first, min(first + 13, len(all_classes()))):
         _, kwargs = all_classes()[seed]
         rng = np.random.default_rng([35, seed])

@@ -65,29 +65,3 @@ def sparse_matrix(rng: np.random.Generator, n: int, margin: float) -> sparse.csr
     A = sparse.csr_array((w[keep], (i[keep], j[keep])), shape=(n, n))
     A = A + A.T
     return sparse.csr_array(sparse.diags_array(A.sum(axis=1) + margin) - A)
-
-
-def dominance_case(rng: np.random.Generator, n: int):
-    """A random H-matrix with integer entries: its edges, diagonal and vectors that prove a positive rate."""
-    m = 3 * n
-    sources, targets = rng.integers(0, n, m), rng.integers(0, n, m)
-    keep = np.unique(sources * n + targets, return_index=True)[1]
-    keep = keep[sources[keep] != targets[keep]]
-    sources, targets = sources[keep], targets[keep]
-    weights = rng.choice([-1, 1], len(keep)) * rng.integers(1, 1000, len(keep))
-    u, v = rng.integers(1, 2**20, n), rng.integers(1, 2**20, n)
-    need = np.zeros(n)
-    np.add.at(need, targets, np.abs(weights) * u[sources] / u[targets])
-    np.add.at(need, sources, np.abs(weights) * v[targets] / v[sources])
-    diagonal = (need / 2 + rng.uniform(1, 50, n)).astype(np.int64) + 1
-    return (sources, targets, weights), diagonal, u, v
-
-
-def dominance_rate(n, edges, diagonal, u, v) -> Fraction:
-    """The largest rate, entry by entry in rationals."""
-    u, v = u.tolist(), v.tolist()
-    rates = [2 * Fraction(d) for d in diagonal.tolist()]
-    for s, t, w in zip(*(x.tolist() for x in edges), strict=True):
-        rates[t] -= Fraction(abs(w) * u[s], u[t])
-        rates[s] -= Fraction(abs(w) * v[t], v[s])
-    return min(rates)

@@ -19,19 +19,19 @@ from ptcc_certify import NominalProtocol
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.lyapunov import family_search
+from ptcc_certify.lyapunov import common_form_search
 from ptcc_certify.lyapunov.aimed_forms import Aim, aimed_functions
+from ptcc_certify.lyapunov.common_form_search import search_common_forms
+from ptcc_certify.lyapunov.common_forms import CommonForm, decay_matrices, prove_mode
 from ptcc_certify.lyapunov.common_left_vector import undirected_function
-from ptcc_certify.lyapunov.family_function import FamilyFunction, decay_matrices, prove_mode
-from ptcc_certify.lyapunov.family_rate_upper_bound import (
-    FamilyRateBound,
+from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.slow_signals import (
+    SignalRateBound,
     prove_candidate,
-    prove_family_rate_bound,
+    prove_signal_rate_bound,
     prove_word,
     rate_bounds,
 )
-from ptcc_certify.lyapunov.family_search import search_family
-from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.family_behaviour import decide
 
 TENTH = Fraction(1, 10)
@@ -72,8 +72,8 @@ def certified(request):
         rng = np.random.default_rng(KINDS.index(request.param))
         family = random_family(rng, request.param, 4, 2, TENTH, 0.3)
     quotient = Quotient.of(decide(family)[0])
-    functions = search_family(quotient).functions
-    return quotient, functions, prove_family_rate_bound(quotient, functions)
+    functions = search_common_forms(quotient).functions
+    return quotient, functions, prove_signal_rate_bound(quotient, functions)
 
 
 # ---------------------------------------------------------------------- the quotient
@@ -142,7 +142,6 @@ def test_inputs_and_coordinates_stay_below_their_constants_for_every_member(cert
             assert own <= c * value
             largest = max(largest, float(own / (c * value)) if c * value else 0.0)
     assert largest > 0.2  # the constants are not idle
-    assert V.deviation_constants[0] == 4 * V.input_constants[0] / V.rate**2
 
 
 def test_random_signals_never_beat_the_certificate(certified):
@@ -170,16 +169,16 @@ def test_one_uncertain_follower_decays_at_its_least_weight():
 def test_an_outage_keeps_v_and_the_other_modes_let_it_fall():
     pair = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", -2)])
     nothing = SignedDigraph.from_edges([], nodes="ab")
-    best = search_family(Quotient(Family.switching({"on": pair, "off": nothing}))).functions[0]
+    best = search_common_forms(Quotient(Family.switching({"on": pair, "off": nothing}))).functions[0]
     assert best.rates[1] == 0 and best.rates[0] > 2.9  # both eigenvalues have the real part 3/2
-    assert best.rate == 0 and best.deviation_constants is None
+    assert best.rate == 0
 
 
 def test_a_mode_without_decay_may_be_given_a_share_of_the_clock():
     full = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1), ("c", "a", 1), ("c", "d", 2)])
     part = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1)], nodes="abcd")
     quotient = Quotient(Family.switching([full, part]))
-    equal, shared = (search_family(quotient, ["full"], shares=s).functions for s in (None, [0.5, 0.5]))
+    equal, shared = (search_common_forms(quotient, ["full"], shares=s).functions for s in (None, [0.5, 0.5]))
     assert all(V.rates[1] <= 0 for V in (*equal, *shared))
     # The spectral rate of the full mode is 3; the other costs little.
     assert sum(shared[0].rates) > Fraction(29, 10) > sum(equal[0].rates)
@@ -187,7 +186,7 @@ def test_a_mode_without_decay_may_be_given_a_share_of_the_clock():
 
 def test_where_all_is_at_rest_there_is_nothing_to_prove():
     quotient = Quotient(Family.from_intervals([], nodes=["a"]))
-    assert search_family(quotient).functions == () and prove_family_rate_bound(quotient) is None
+    assert search_common_forms(quotient).functions == () and prove_signal_rate_bound(quotient) is None
 
 
 def test_scaling_all_weights_scales_rates_and_changing_camps_changes_none():
@@ -195,7 +194,8 @@ def test_scaling_all_weights_scales_rates_and_changing_camps_changes_none():
     flipped = [(s, t, -high, -low) if "b" in (s, t) else (s, t, low, high) for s, t, low, high in edges]
     scaled = [(s, t, 7 * low, 7 * high) for s, t, low, high in edges]
     rates = [
-        float(search_family(Quotient(Family.from_intervals(e))).functions[0].rate) for e in (edges, flipped, scaled)
+        float(search_common_forms(Quotient(Family.from_intervals(e))).functions[0].rate)
+        for e in (edges, flipped, scaled)
     ]
     assert rates[1] == pytest.approx(rates[0], rel=1e-3) and rates[2] == pytest.approx(7 * rates[0], rel=1e-3)
 
@@ -203,7 +203,7 @@ def test_scaling_all_weights_scales_rates_and_changing_camps_changes_none():
 def test_a_time_limit_leaves_what_was_proved_before():
     quotient = Quotient(random_family(np.random.default_rng(5), "consensus", 8, 3, TENTH))
     with lmi.time_limit(0):
-        search = search_family(quotient)
+        search = search_common_forms(quotient)
     assert search.functions == () and search.cut_off == ("Lyapunov equations", "class diagonal", "class full")
 
 
@@ -220,7 +220,7 @@ def test_what_was_climbed_to_before_a_time_limit_is_proved():
     with pytest.MonkeyPatch.context() as patch, lmi.time_limit(300):
         patch.setattr(lmi.common_lyapunov._Search, "_step", slow_after_the_first)
         patch.setattr(lmi.common_lyapunov._Search, "nominal_start", lambda self: None)
-        search = search_family(quotient, ["full"])
+        search = search_common_forms(quotient, ["full"])
     assert search.functions and len(calls) == 2
 
 
@@ -228,7 +228,7 @@ def test_where_no_program_can_be_afforded_there_is_a_useful_rate_all_the_same(mo
     quotient = Quotient(random_family(np.random.default_rng(5), "consensus", 24, 1, TENTH))
     monkeypatch.setattr(lmi.common_lyapunov, "program_seconds", lambda *_: math.inf)
     with lmi.time_limit(60, work=True):
-        search = search_family(quotient)
+        search = search_common_forms(quotient)
     assert {"class diagonal", "class full"} <= set(search.cut_off)
     (V,) = search.functions
     assert V.kind == "full" and V.rate > Fraction(1, 10)
@@ -237,7 +237,7 @@ def test_where_no_program_can_be_afforded_there_is_a_useful_rate_all_the_same(mo
 def test_a_program_that_fails_leaves_those_of_smaller_rates(monkeypatch: pytest.MonkeyPatch):
     ring = [(k, (k + 1) % 5, -1 if k == 4 else 1, -1 if k == 4 else 1) for k in range(5)]
     quotient = Quotient.of(decide(Family.from_intervals([*ring, (0, 2, 1, 3), (3, 1, 1, 3)]))[0])
-    usual, calls = family_search.least_condition, list[int]()
+    usual, calls = common_form_search.least_condition, list[int]()
 
     def failing(*given, **words):
         calls.append(1)
@@ -245,8 +245,8 @@ def test_a_program_that_fails_leaves_those_of_smaller_rates(monkeypatch: pytest.
             raise lmi.NoCertificate("the solver failed")
         return usual(*given, **words)
 
-    monkeypatch.setattr(family_search, "least_condition", failing)
-    search = search_family(quotient, ["full"])
+    monkeypatch.setattr(common_form_search, "least_condition", failing)
+    search = search_common_forms(quotient, ["full"])
     assert len(calls) > 1 and "class full: the solver failed" in search.notes
     assert len(search.functions) > 1 and search.functions[-1].overshoot < search.functions[0].overshoot / 2
 
@@ -262,14 +262,14 @@ def test_consensus_of_more_agents_than_programs_take_has_a_rate_that_the_check_a
 
 def test_large_families_are_left_to_others():
     path = Family.from_intervals([(k, k + 1, 1, 2) for k in range(500)])
-    search = search_family(Quotient(path))
+    search = search_common_forms(Quotient(path))
     assert search.functions == () and "500 agents" in search.notes[0]
-    assert prove_family_rate_bound(Quotient(path)) is None
+    assert prove_signal_rate_bound(Quotient(path)) is None
 
 
 def test_enough_ends_the_search():
     quotient = Quotient(random_family(np.random.default_rng(6), "consensus", 4, 1))
-    assert {V.kind for V in search_family(quotient, enough=Fraction(0)).functions} == {"diagonal"}
+    assert {V.kind for V in search_common_forms(quotient, enough=Fraction(0)).functions} == {"diagonal"}
 
 
 # ---------------------------------------------------------------------- undirected graphs
@@ -281,7 +281,7 @@ def test_undirected_families_are_as_fast_as_their_least_weights_and_no_faster():
         family = random_family(rng, "undirected", int(rng.integers(2, 9)), int(rng.integers(1, 4)), TENTH, 0.3)
         V = undirected_function(Quotient.of(decide(family)[0]))
         spectra = [np.sort(np.linalg.eigvalsh(mode.mandatory.dense_laplacian())) for mode in family.modes]
-        slowest = 2 * min(values[len(V.pivots)] for values in spectra)
+        slowest = 2 * min(values[len(V.quotient.pivots)] for values in spectra)
         assert V.optimal and float(V.rate) == pytest.approx(slowest, rel=1e-6)
 
 
@@ -292,7 +292,7 @@ def test_the_closed_form_is_refused_where_directions_change_alone():
     together = Family.from_intervals([(s, t, 1, 10) for s, t in ends], undirected=True)
     assert undirected_function(Quotient(alone)) is None
     assert float(undirected_function(Quotient(together)).rate) == pytest.approx(2 * 0.585786, rel=1e-5)
-    assert float(prove_family_rate_bound(Quotient(alone)).value) < 2 * 0.157
+    assert float(prove_signal_rate_bound(Quotient(alone)).value) < 2 * 0.157
 
 
 def test_directed_graphs_that_share_a_left_vector_have_the_closed_form():
@@ -344,8 +344,8 @@ def test_switching_may_be_slower_than_every_member_and_every_mixture():
     day = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)])
     night = SignedDigraph.from_edges([("c", "a", -2), ("a", "b", 1)])
     quotient = Quotient(Family.switching([day, night]))
-    functions = search_family(quotient).functions
-    bound = prove_family_rate_bound(quotient, functions)
+    functions = search_common_forms(quotient).functions
+    bound = prove_signal_rate_bound(quotient, functions)
     constant = min(c.value for c in rate_bounds(quotient) if c.kind != "word")
     assert bound.kind == "word" and functions[0].rate < bound.value < 0.8 * constant
 
@@ -356,7 +356,7 @@ def test_a_mixture_may_be_slower_than_its_modes():
     quotient = Quotient(Family.switching(turns))
     mixture = next(c for c in rate_bounds(quotient) if c.kind == "mixture")
     proved = prove_candidate(quotient, mixture)
-    assert isinstance(proved, FamilyRateBound) and proved.kind == "mixture"
+    assert isinstance(proved, SignalRateBound) and proved.kind == "mixture"
     assert float(proved.value) == pytest.approx(mixture.value, rel=1e-3)
 
 
@@ -382,10 +382,10 @@ def test_families_of_every_kind_have_rates_below_their_bounds(seed):
     kind = KINDS[seed % len(KINDS)]
     family = random_family(rng, kind, int(rng.integers(2, 9)), int(rng.integers(1, 5)), share, 0.2)
     quotient = Quotient.of(decide(family)[0])
-    functions = search_family(quotient).functions
-    bound = prove_family_rate_bound(quotient, functions)
+    functions = search_common_forms(quotient).functions
+    bound = prove_signal_rate_bound(quotient, functions)
     if quotient.nodes:
-        best: FamilyFunction = functions[0]
+        best: CommonForm = functions[0]
         assert best.rate <= bound.value
         assert lmi.prove_positive_definite(best.matrix)
         assert replace(best, rates=(bound.value,)).rate == bound.value
@@ -397,8 +397,8 @@ def test_scaling_all_weights_scales_the_rate_however_far(exponent):
     rates = []
     for size in (1, unit):
         family = Family.from_intervals([(s, t, size * low, size * high) for s, t, low, high in edges])
-        search = search_family(quotient := Quotient.of(decide(family)[0]), ("diagonal",))
-        bound = prove_family_rate_bound(quotient, search.functions)
+        search = search_common_forms(quotient := Quotient.of(decide(family)[0]), ("diagonal",))
+        bound = prove_signal_rate_bound(quotient, search.functions)
         rates.append((search.functions[0].rate / size, bound.value / size))
     assert float(rates[1][0]) == pytest.approx(float(rates[0][0]), rel=1e-3)
     assert rates[1][0] <= rates[1][1]
@@ -420,7 +420,7 @@ def test_forms_for_one_state_bound_inputs_more_closely_than_those_of_least_condi
             for s in aim.clocks
         ]
 
-    fastest = search_family(quotient, slower=False).functions
+    fastest = search_common_forms(quotient, slower=False).functions
     aimed = list(aimed_functions(quotient, aim, fastest, []))
     assert max(V.rate for V in aimed) <= max(V.rate for V in fastest)
-    assert (np.array(bounds(aimed)) < 0.7 * np.array(bounds(search_family(quotient).functions))).all()
+    assert (np.array(bounds(aimed)) < 0.7 * np.array(bounds(search_common_forms(quotient).functions))).all()

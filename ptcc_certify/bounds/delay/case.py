@@ -19,7 +19,7 @@ from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.lyapunov.late_follower_rows import listeners
+from ptcc_certify.lyapunov.follower_rows import listeners
 from ptcc_certify.model.base import Protocol
 from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.late_messages import LateMessages
@@ -75,8 +75,6 @@ class LateCase:
     initial_state : sequence of N Fraction, optional
     ends : sequence of N (middle, radius), optional
         Of ``Q X(0)``; without it bounds are for every initial state within 1 of its final one.
-    leaders : MovingLeaders, optional
-        Leaders move, and followers are disturbed; ``x*`` moves with the leaders. A sign term asks for messages at once.
     influence : Influence, optional
         Exact; it belongs to ``forms``.
     forms : sequence of DecayingForm
@@ -95,7 +93,6 @@ class LateCase:
     messages: LateMessages
     initial_state: Sequence[Fraction] | None = None
     ends: Sequence[tuple[Fraction, Fraction]] | None = None
-    leaders: MovingLeaders | None = None
     influence: Influence | None = None
     forms: Sequence[DecayingForm] = ()
 
@@ -114,6 +111,11 @@ class LateCase:
     def followers(self) -> np.ndarray:
         """The agents that hear others, ascending; of a graph that has leaders in groups, others than these."""
         return self.structure.followers if isinstance(self.structure, Structure) else listeners(self.structure)
+
+    @property
+    def leaders(self) -> MovingLeaders | None:
+        """How leaders move, and what disturbs followers; ``x*`` moves with the leaders. None of leaders at rest."""
+        return self.messages.leaders
 
     @property
     def relative(self) -> bool:

@@ -33,7 +33,7 @@ from lmi.exact.decimal_rounding import float_up
 from lmi.exact.elementary_enclosures import log, rounded
 from ptcc_certify.bounds.delay.case import LateCase
 from ptcc_certify.checker.input_formulas import BITS, drift_above
-from ptcc_certify.lyapunov.late_follower_rows import FollowerRows, RowWitness
+from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
 from ptcc_certify.model.gain import Gain
 
 #: Up to so many followers many ``q`` are tried; beyond, the best of those that one vector proves.

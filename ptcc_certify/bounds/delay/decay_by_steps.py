@@ -24,7 +24,7 @@ from fractions import Fraction
 import numpy as np
 
 from ptcc_certify.bounds.delay.case import LateCase
-from ptcc_certify.lyapunov.late_follower_rows import FollowerRows
+from ptcc_certify.lyapunov.follower_rows import FollowerRows
 
 #: Instants at most, and products of weights that all instants together may take.
 MOST_INSTANTS, MOST_PRODUCTS = 2000, 20_000_000

@@ -42,9 +42,9 @@ from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, pairs_of
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.lyapunov.late_follower_rows import FollowerRows, RowWitness
+from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
 from ptcc_certify.model.base import Protocol
-from ptcc_certify.model.late_messages import AtOnce, LateMessages
+from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.limited_gain import LimitedGain
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.virtual_positions import TrackingProtocol, Vehicles
@@ -114,7 +114,7 @@ class LateBounds:
     @property
     def tracks(self) -> bool:
         """Whether leaders move, and nothing is late, lost or rounded."""
-        return isinstance(self.messages, AtOnce)
+        return self.messages.tracks
 
     @property
     def bounding_rho2(self) -> str | None:
@@ -387,7 +387,7 @@ def late_obligations(late: LateBounds | None) -> Iterator[Obligation]:
         yield Obligation("late-lmi", "messages.lmi", {"b": lmi.b}, matrix)
 
 
-def delays(messages: LateMessages, of: SignedDigraph | Family, leaders: MovingLeaders | None = None) -> Delays:
+def delays(messages: LateMessages, of: SignedDigraph | Family) -> Delays:
     """Return how late, how often lost and how inexact messages are, as files have it."""
     period, latency = messages.period, messages.latencies(of)
     return Delays(
@@ -397,7 +397,7 @@ def delays(messages: LateMessages, of: SignedDigraph | Family, leaders: MovingLe
         own="late" if messages.own_delay else "fresh",
         value_error=messages.value_error,
         gain_cap=messages.gain_cap,
-        leaders=asked_leaders(leaders),
+        leaders=asked_leaders(messages.leaders),
     )
 
 
@@ -405,7 +405,7 @@ def messages_section(late: LateBounds) -> MessagesSection:
     """Return what is proved with late messages, as files have it."""
     proved: dict[str, Any] = {f.name: getattr(late, f.name) for f in declared(MessagesSection) if hasattr(late, f.name)}
     proved |= {"vehicles": vehicles_section(late.vehicles), "staged": late.staged or None}
-    return MessagesSection(**proved | vars(delays(late.messages, late.case.of, late.leaders)))
+    return MessagesSection(**proved | vars(delays(late.messages, late.case.of)))
 
 
 def read_late(
@@ -417,10 +417,7 @@ def read_late(
         return None
     vehicles = read_vehicles(section.vehicles)
     messages = read_messages(section, structure, None if vehicles is None else Vehicles(vehicles.v0))
-    proved, moving = report.proved, section.leaders
-    leaders = None if moving is None else read_leaders(moving)
-    case = LateCase(structure, protocol, messages, leaders=leaders)
-    rows = []
+    proved, case, rows = report.proved, LateCase(structure, protocol, messages), []
     for i, row in enumerate(section.rows):
         step = proved["late-rows", f"messages.rows[{i}]"]
         rows.append(RowBound(RowWitness(step["q"], step["b"], floats(step["witness"].u)), **vars(row)))
@@ -469,8 +466,6 @@ def read_messages(section: Delays, structure: Structure | Family, vehicles: Vehi
     latency: Any = section.latency
     if isinstance(latency, Numbers):
         latency = dict(zip(pairs_of(of), latency, strict=True))
-    if section.leaders is not None and vehicles is None and not (section.delay or section.value_error):
-        return AtOnce(gain_cap=section.gain_cap)
     return LateMessages(
         delay=latency,
         period=None if packets is None else packets.period,
@@ -479,4 +474,5 @@ def read_messages(section: Delays, structure: Structure | Family, vehicles: Vehi
         own_delay=section.own == "late",
         gain_cap=section.gain_cap,
         vehicles=vehicles,
+        leaders=None if section.leaders is None else read_leaders(section.leaders),
     )

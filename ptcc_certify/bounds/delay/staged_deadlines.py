@@ -10,7 +10,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from ptcc_certify.lyapunov.late_follower_rows import FollowerRows
+from ptcc_certify.lyapunov.follower_rows import FollowerRows
 
 
 def stage_deadlines(rows: FollowerRows, T: Fraction, delay: Fraction) -> tuple[Fraction, ...] | None:

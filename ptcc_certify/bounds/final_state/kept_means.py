@@ -26,9 +26,8 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.lyapunov.family_function import MARGIN, FamilyFunction, mean_constant, rounded_up
+from ptcc_certify.lyapunov.common_forms import MARGIN, CommonForm, mean_constant, rounded_up, weighted_mean
 from ptcc_certify.lyapunov.interval_rows import IntervalRows
-from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
 from ptcc_certify.theorems.lemmas import exact_left_vector
 
@@ -136,17 +135,17 @@ def mean_of_shares(component: FamilyComponent, shares: Sequence[Fraction]) -> Le
     return LeadingGroup(tuple(nodes.tolist()), tuple(component.gauge.tolist()), tuple(whole.tolist()))
 
 
-def with_means(function: FamilyFunction, quotient: Quotient, groups: Sequence[LeadingGroup]) -> FamilyFunction:
+def with_means(function: CommonForm, groups: Sequence[LeadingGroup]) -> CommonForm:
     """Add to a function of positive rate a weighted mean of each leading group that keeps none exactly.
 
     Examples
     --------
-    >>> from ptcc_certify.lyapunov.family_search import search_family
+    >>> from ptcc_certify.lyapunov.common_form_search import search_common_forms
+    >>> from ptcc_certify.lyapunov.quotient import Quotient
     >>> from ptcc_certify.theorems.family_behaviour import decide
     >>> (component,) = decide(Family.from_intervals([("a", "b", 9, 11), ("b", "a", 9, 11)]))
-    >>> quotient = Quotient.of(component)
-    >>> V = with_means(search_family(quotient).functions[0], quotient, leading_groups(component))
-    >>> [str(p) for p in V.means[0][0]]
+    >>> V = with_means(search_common_forms(Quotient.of(component)).functions[0], leading_groups(component))
+    >>> [str(p) for p in V.means[0].weights.values()]
     ['1/2', '1/2']
     """
     if function.rate <= 0:
@@ -154,13 +153,11 @@ def with_means(function: FamilyFunction, quotient: Quotient, groups: Sequence[Le
     means = []
     for group in groups:
         if group.vector is None:
-            q = [Fraction(0)] * quotient.family.n_nodes
-            p = middle_left_vector(quotient.family.restricted(np.array(group.nodes)))
-            for v, g, weight in zip(group.nodes, group.camps, p, strict=True):
-                q[v] = g * weight
-            constant = mean_constant(function, quotient, q)
+            p = middle_left_vector(function.quotient.family.restricted(np.array(group.nodes)))
+            q = {v: g * weight for v, g, weight in zip(group.nodes, group.camps, p, strict=True) if weight}
+            constant = mean_constant(function, q)
             if constant is not None:
-                means.append((tuple(q), rounded_up(constant * MARGIN)))
+                means.append(weighted_mean(function.quotient, q, rounded_up(constant * MARGIN)))
     return replace(function, means=tuple(means))
 
 

@@ -34,7 +34,7 @@ from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import analyse, find_camps
-from ptcc_certify.lyapunov.family_function import FamilyFunction, mean_constant, rounded_up
+from ptcc_certify.lyapunov.common_forms import CommonForm, mean_constant, rounded_up
 from ptcc_certify.lyapunov.interval_rows import IntervalRows, Policy
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.family_kernel import reached
@@ -326,7 +326,7 @@ def _solve_exactly(
 
 def weighted_mean_interval(
     quotient: Quotient,
-    function: FamilyFunction,
+    function: CommonForm,
     camps: Sequence[int],
     x: Sequence[Fraction],
     p: Sequence[Fraction] | None = None,
@@ -336,7 +336,7 @@ def weighted_mean_interval(
     Parameters
     ----------
     quotient : Quotient
-    function : FamilyFunction
+    function : CommonForm
         Of positive rate.
     camps : sequence of N +1/-1
     x : sequence of N Fraction
@@ -351,11 +351,11 @@ def weighted_mean_interval(
 
     Examples
     --------
-    >>> from ptcc_certify.lyapunov.family_search import search_family
+    >>> from ptcc_certify.lyapunov.common_form_search import search_common_forms
     >>> from ptcc_certify.theorems.family_behaviour import decide
     >>> pair = decide(Family.from_intervals([("a", "b", 9, 11), ("b", "a", 9, 11)]))[0]
     >>> quotient, x = Quotient.of(pair), (Fraction(0), Fraction(1))
-    >>> low, high = weighted_mean_interval(quotient, search_family(quotient).functions[0], (1, 1), x)
+    >>> low, high = weighted_mean_interval(quotient, search_common_forms(quotient).functions[0], (1, 1), x)
     >>> round(float(low), 2), round(float(high), 2)
     (0.44, 0.56)
     """
@@ -365,7 +365,7 @@ def weighted_mean_interval(
     if sum(p, Fraction(0)) != 1:
         raise HypothesisError("the sum of the weights is not 1")
     signed = [weight * camp for weight, camp in zip(p, camps, strict=True)]
-    constant = mean_constant(function, quotient, signed)
+    constant = mean_constant(function, dict(enumerate(signed)))
     if constant is None:
         raise HypothesisError("the matrix of the function is not proved definite")
     mean = sum((s * y for s, y in zip(signed, x, strict=True)), Fraction(0))

@@ -16,10 +16,11 @@ import numpy as np
 from lmi.exact.numbers import integers
 from ptcc_certify.bounds.deviation.of_family import deviation_on_clock
 from ptcc_certify.certificate.constrained_switching.claims import RateClaim
-from ptcc_certify.certificate.family_proof import BoundFunction, ComponentProof, FamilyProof
+from ptcc_certify.certificate.family_proof import ComponentProof, FamilyProof
 from ptcc_certify.checker.common_forms import Scaled
 from ptcc_certify.checker.common_kernel_ends import WeightedMean
 from ptcc_certify.checker.input_formulas import root_above
+from ptcc_certify.lyapunov.common_forms import CommonForm
 from ptcc_certify.lyapunov.mode_forms import mode_functions
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.model.constrained_switching import DwellTime
@@ -34,12 +35,12 @@ class SwitchedFunction:
 
     Attributes
     ----------
-    functions : sequence of BoundFunction
+    functions : sequence of CommonForm
         Of each mode its form.
     rate, factor : Fraction
     """
 
-    functions: Sequence[BoundFunction]
+    functions: Sequence[CommonForm]
     rate: Fraction
     factor: Fraction
 
@@ -116,9 +117,8 @@ def _deviation(
 ) -> np.ndarray | None:
     """Bound the agents of a component; None where so many switches are allowed that nothing would be said."""
     assert claim.forms is not None
-    pairs = mode_functions(Quotient.of(part.component), claim.forms)
-    functions = [BoundFunction(quotient, V) for quotient, V in pairs if V.input_constants]
-    if len(functions) < len(pairs):
+    functions = mode_functions(Quotient.of(part.component), claim.forms)
+    if not all(V.input_constants for V in functions):
         return None
     if not isinstance(claim.signal, DwellTime):  # one mode acts for ever
         own = [deviation_on_clock(V, part.rest_states, x, clock) for V in functions]

@@ -31,7 +31,7 @@ from ptcc_certify.graphs.rationals import writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
 from ptcc_certify.lyapunov.clock_shares import search_share_form
-from ptcc_certify.lyapunov.family_function import FamilyFunction
+from ptcc_certify.lyapunov.common_forms import CommonForm
 from ptcc_certify.lyapunov.mode_forms import ModeForms, search_mode_forms, search_single_forms, within_reach
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.model import Protocol
@@ -140,7 +140,7 @@ def _rate_claim(
     number: int, signal: SignalClass, part: ComponentProof, protocol: Protocol, notes: list[str], least: Fraction | None
 ) -> RateClaim | None:
     best, forms = part.rate, None
-    own = [V for V in part.functions if isinstance(V, FamilyFunction)]
+    own = [V for V in part.functions if isinstance(V, CommonForm)]
     price = switch_price(signal, protocol)
     asked = least if isinstance(signal, DwellTime) and signal.clock == "t" else None
     with share_of_time(1.0, STEP, notes):
@@ -161,7 +161,7 @@ def _share_claim(
     number: int, signal: ClockShares, part: ComponentProof, state: Sequence[Fraction] | None, notes: list[str]
 ) -> ShareClaim | None:
     with share_of_time(1.0, STEP, notes):
-        known = [V for V in part.functions if isinstance(V, FamilyFunction) and V.kind != "undirected"]
+        known = [V for V in part.functions if isinstance(V, CommonForm) and V.kind != "undirected"]
         form = search_share_form(part.component, signal.shares, known)
         if form is None:
             return None

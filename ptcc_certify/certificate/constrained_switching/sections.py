@@ -38,8 +38,9 @@ from ptcc_certify.checker.reading import Interval
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, find_camps
 from ptcc_certify.lyapunov.clock_shares import ShareForm
-from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends
+from ptcc_certify.lyapunov.common_forms import CommonForm, prove_ends
 from ptcc_certify.lyapunov.mode_forms import ModeForms
+from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.model.constrained_switching import ClockShares, DwellTime, JointWindows, SignalClass
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
 from ptcc_certify.theorems.joint_windows import contraction
@@ -185,13 +186,11 @@ def _read_value(entry: FinalValue, mode: Mode) -> ValueEnds:
 
 
 def _read_share_form(entry: SharesSection, steps: Sequence[Any], component: FamilyComponent) -> ShareForm:
-    index = {label: v for v, label in enumerate(component.family.labels)}
-    nodes = tuple(index[label] for label in entry.nodes)
-    pivots = tuple(v for v in range(component.nodes.size) if v not in set(nodes))
+    quotient = Quotient(component.family, component.kernel)
     matrix, witnesses = list(map(list, entry.form)), [step["witness"] for step in steps]
     ends = prove_ends(matrix)
     assert ends is not None, "the check has proved it definite"
     taus = tuple(() if witness is None else tuple(witness.multipliers) for witness in witnesses)
-    function = FamilyFunction("full", pivots, nodes, matrix, tuple(step["b"] for step in steps), taus, *ends)
-    behaviour = BIPARTITE_CONSENSUS if pivots else STABILITY
+    function = CommonForm("full", quotient, matrix, tuple(step["b"] for step in steps), taus, *ends)
+    behaviour = BIPARTITE_CONSENSUS if quotient.pivots else STABILITY
     return ShareForm(function, behaviour, tuple(witness is None for witness in witnesses))

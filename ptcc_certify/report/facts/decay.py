@@ -246,7 +246,7 @@ def explicit_logs(certificate: Certificate) -> list[float]:
 
 def no_search(certificate: Certificate) -> Sentence:
     """Tell why no rate was proved: too many agents for a search, or too little time; nothing where it is not known."""
-    from ptcc_certify.lyapunov.family_search import CLOSED_ROWS, TOO_MANY_ROWS
+    from ptcc_certify.lyapunov.common_form_search import CLOSED_ROWS, TOO_MANY_ROWS
 
     without = [
         part.component for part in certificate.family_proof.parts if part.component.nodes.size > 1 and not part.rate

@@ -100,25 +100,29 @@ def _vehicles(late: LateBounds) -> Facts:
 
 def _tracking(late: LateBounds, leaders: MovingLeaders, at: Fraction | None) -> Facts:
     """Tell how followers track leaders that move, of which they hear at once."""
-    yield Fact(head="leaders", note=leaders_text(leaders))
+    goal, head = "target", "tracking"
+    if not leaders.total:  # a cap is all that was asked
+        goal, head = "final state", "limited"
+    if leaders.total or leaders.sign_gain is not None:
+        yield Fact(head="leaders", note=leaders_text(leaders))
     if not late.rows:
         text = "nothing is proved: no vector for the followers was found"
-        yield Fact(head="tracking", standing="unproved", note=text, loud=True)
+        yield Fact(head=head, standing="unproved", note=text, loud=True)
         return
     protocol, after = late.case.protocol, late.after or 0.0
     if (cap := late.messages.gain_cap) is not None:
-        yield Fact(head="tracking", note=f"gain <= {near(cap)}: under a cap nothing settles")
+        yield Fact(head=head, note=f"gain <= {near(cap)}: under a cap nothing settles")
     where = f"within {up(late.largest, 2)} of its" if late.largest else "on its"
     then = f"within {up(after, 2)} of it from then on" if after else "and ever after"
-    text = f"every follower {where} target at T = {near(protocol.T)}, {then}"
-    yield Fact(head="tracking", note=text, brief=(f"{text};",))
+    text = f"every follower {where} {goal} at T = {near(protocol.T)}, {then}"
+    yield Fact(head=head, note=text, brief=(f"{text};",))
     instants = {"0.9 T": protocol.T * 9 / 10, "0.99 T": protocol.T * 99 / 100}
     if at is not None:
         instants = {f"t = {near(at)}": at}
     whole = FROM_WITHIN_1.removeprefix(",") if late.relative else ""
     bounds = late.largest_bound([float(t) for t in instants.values()]).tolist()
     within = ", ".join(f"{_bound_text(late, x, 2)} of it at {when}" for when, x in zip(instants, bounds, strict=True))
-    yield Fact(head="tracking", note=f"before T within {within}{whole}")
+    yield Fact(head=head, note=f"before T within {within}{whole}")
     if late.inputs is not None:
         largest = float(late.inputs.max())
         text = f"bounded up to T; |u_k| <= {up(largest, 4) if largest else 0}{whole}"

@@ -29,7 +29,7 @@ def beside_law(certificate: Certificate) -> list[str]:
             told.append(f"Here messages are exact; {off}.")
         if messages.gain_cap is not None and messages.vehicles is None and not limits:
             limits = [Limits(gain_cap=messages.gain_cap)]
-    if leaders is not None:
+    if leaders is not None and (leaders.total or leaders.sign_gain is not None):
         what = "leaders are at rest; of those that move was asked" if leaders.speed else "nothing disturbs; asked was"
         told.append(f"Here {what}: {leaders_text(leaders)}.")
     if certificate.noise is not None:

@@ -11,8 +11,7 @@ from ptcc_certify.report.facts.claim import family_claims, structure_claims
 from ptcc_certify.report.facts.graph import family_facts, graph_facts, leader_facts
 
 if TYPE_CHECKING:
-    from ptcc_certify.gain_design.agents_answer import AgentsDesign
-    from ptcc_certify.gain_design.answer import Design
+    from ptcc_certify.gain_design.answer import AgentsDesign, Design
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.theorems.family_behaviour import FamilyComponent

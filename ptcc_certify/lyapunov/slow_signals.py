@@ -30,7 +30,7 @@ from lmi.dyadic import round_to_bits
 from lmi.search_time import checkpoint
 from lmi.uncertain_matrix import UncertainMatrix
 from ptcc_certify.graphs.size_limits import EXACT_NODES
-from ptcc_certify.lyapunov.family_function import FamilyFunction, rounded_up
+from ptcc_certify.lyapunov.common_forms import CommonForm, rounded_up
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.rate_upper_bound import prove_slow_eigenvalues
 from ptcc_certify.theorems.matrix_arithmetic import Matrix
@@ -70,7 +70,7 @@ class Member:
 
 
 @dataclass(frozen=True)
-class FamilyRateBound:
+class SignalRateBound:
     """No rate for every signal exceeds ``value``.
 
     Attributes
@@ -111,15 +111,15 @@ class Candidate:
     durations: tuple[float, ...] = (1.0,)
 
 
-def prove_family_rate_bound(
-    quotient: Quotient, functions: Sequence[FamilyFunction] = (), seed: int = 0
-) -> FamilyRateBound | None:
+def prove_signal_rate_bound(
+    quotient: Quotient, functions: Sequence[CommonForm] = (), seed: int = 0
+) -> SignalRateBound | None:
     """Find and prove an upper bound on the rate for every signal; None if none is proved, or above 120 rows.
 
     Parameters
     ----------
     quotient : Quotient
-    functions : sequence of FamilyFunction
+    functions : sequence of CommonForm
         Lyapunov functions, against which signals are played: at every instant the member by which one falls least.
     seed : int
         Of the members that are drawn at random.
@@ -129,14 +129,14 @@ def prove_family_rate_bound(
     >>> from ptcc_certify.graphs.family import Family
     >>> day = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)])
     >>> night = SignedDigraph.from_edges([("c", "a", -2), ("a", "b", 1)])
-    >>> bound = prove_family_rate_bound(Quotient(Family.switching([day, night])))
+    >>> bound = prove_signal_rate_bound(Quotient(Family.switching([day, night])))
     >>> bound.kind, round(float(bound.value), 2)
     ('word', 1.41)
     """
     if not 0 < len(quotient.nodes) <= EXACT_NODES:
         return None
     candidates = rate_bounds(quotient, functions, seed)
-    proved: list[FamilyRateBound] = []
+    proved: list[SignalRateBound] = []
     single = next(c for c in candidates if c.kind != "word")  # what floats say of words may be wrong, of others hardly
     for candidate in dict.fromkeys([*candidates[:_PROVED], single]):
         checkpoint()
@@ -147,7 +147,7 @@ def prove_family_rate_bound(
     return min(proved, key=lambda bound: bound.value, default=None)
 
 
-def rate_bounds(quotient: Quotient, functions: Sequence[FamilyFunction] = (), seed: int = 0) -> list[Candidate]:
+def rate_bounds(quotient: Quotient, functions: Sequence[CommonForm] = (), seed: int = 0) -> list[Candidate]:
     """Return upper bounds as floating point has them, the least first: of members, mixtures and words."""
     search = _BoundSearch(quotient, np.random.default_rng(seed))
     members = [m for number in range(len(quotient.modes)) for m in search.members(number)]
@@ -415,16 +415,16 @@ def _word_rate(Phi: np.ndarray, duration: float) -> float:
 # ---------------------------------------------------------------------- proofs
 
 
-def prove_candidate(quotient: Quotient, candidate: Candidate) -> FamilyRateBound | None:
+def prove_candidate(quotient: Quotient, candidate: Candidate) -> SignalRateBound | None:
     """Round shares or durations, and prove the bound; None if it fails."""
     matrices = [quotient.modes[m.mode].member(m.levels) for m in candidate.members]
     durations = [round_to_bits(h, _SHARE_BITS) for h in candidate.durations]
     if candidate.kind == "word":
         value = prove_word(matrices, durations)
-        return None if value is None else FamilyRateBound(value, "word", candidate.members, tuple(durations))
+        return None if value is None else SignalRateBound(value, "word", candidate.members, tuple(durations))
     shares = [h / sum(durations) for h in durations]
     A, n = _mixture(matrices, shares), len(matrices[0])
-    mean = FamilyRateBound(
+    mean = SignalRateBound(
         2 * sum((A[i][i] for i in range(n)), Fraction(0)) / n, candidate.kind, candidate.members, tuple(shares)
     )
     c = candidate.value / 2
@@ -435,13 +435,13 @@ def prove_candidate(quotient: Quotient, candidate: Candidate) -> FamilyRateBound
         for gap in _GAPS:
             bound = round_to_bits(c + gap * unit, 53)
             if 2 * bound < mean.value and (witness := prove_slow_eigenvalues(A, bound)) is not None:
-                return FamilyRateBound(2 * bound, candidate.kind, candidate.members, tuple(shares), *witness)
+                return SignalRateBound(2 * bound, candidate.kind, candidate.members, tuple(shares), *witness)
     return mean
 
 
 def prove_again(
     quotient: Quotient, kind: str, members: tuple[Member, ...], durations: Vector, value: Fraction
-) -> FamilyRateBound | None:
+) -> SignalRateBound | None:
     """Prove the bound that given members make, with ``value`` as the aim; None if it fails.
 
     None also where one of them has both signs of a pair of nodes on: the family has no such member.
@@ -459,13 +459,13 @@ def prove_again(
     matrices = [quotient.modes[m.mode].member(m.levels) for m in members]
     if kind == "word":
         rate = prove_word(matrices, durations)
-        return None if rate is None else FamilyRateBound(rate, kind, members, durations)
+        return None if rate is None else SignalRateBound(rate, kind, members, durations)
     A = _mixture(matrices, durations)
     mean = 2 * sum((A[i][i] for i in range(len(A))), Fraction(0)) / len(A)
     if mean <= value:
-        return FamilyRateBound(mean, kind, members, durations)
+        return SignalRateBound(mean, kind, members, durations)
     witness = prove_slow_eigenvalues(A, value / 2)
-    return None if witness is None else FamilyRateBound(value, kind, members, durations, *witness)
+    return None if witness is None else SignalRateBound(value, kind, members, durations, *witness)
 
 
 def _mixture(matrices: Sequence[Matrix], shares: Sequence[Fraction]) -> Matrix:

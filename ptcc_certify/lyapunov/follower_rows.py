@@ -320,20 +320,23 @@ def listeners(family: Family) -> np.ndarray:
     return np.unique(family.union[1])
 
 
+#: What of a family is proved row by row.
+_ASKED_OF_ROWS = "a gain cap, disturbances, noise, late messages, moving leaders and virtual positions"
+
+
 def refuse_other_targets(family: Family) -> None:
     """Refuse a family of whose members the followers of leaders that are single nodes have no common targets."""
     for component in decide(family):
         labels, kernel = component.family.labels, component.kernel
         if kernel is None or component.behaviour is None:
             raise HypothesisError(
-                "late messages, moving leaders and virtual positions: where agents are drawn to depends on the signal "
-                "here, of which nothing is proved yet"
+                f"{_ASKED_OF_ROWS}: where agents are drawn to depends on the signal, of which nothing is proved yet"
             )
         heard = set(listeners(component.family).tolist())
         group = next((c for c in kernel.structure.closed_components if heard.intersection(c.nodes)), None)
         if group is not None:
             raise HypothesisError(
-                "late messages, moving leaders and virtual positions of a family: leaders hear nobody in any mode; "
+                f"{_ASKED_OF_ROWS} of a family: leaders hear nobody in any mode; "
                 f"{shorten(labels[group.nodes[0]])} leads and hears others, of which nothing is proved yet"
             )
 

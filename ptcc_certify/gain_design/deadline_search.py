@@ -4,40 +4,57 @@ Of chains of integrators gain and bound scale with the deadline alone: the Lyapu
 gains ``K`` up to the decay ``R``, which is least at ``R = 2 n``, where the input is bounded; multiplying ``rho1`` and
 ``rho2`` by one number changes ``K`` and nothing else; and a larger share ``rho1 T/(rho2 kappa)`` of the constant
 part of the gain raised the bound wherever it was tried. So the deadline is sought, with ``rho1 T``, ``rho2 kappa`` and
-``R`` as they are: :mod:`ptcc_certify.gain_design.agents_deadlines`. Of the cascade ``alpha`` takes the place of ``R``.
+``R`` as they are. Of the cascade ``alpha`` takes the place of ``R``.
 There, and where agents meet at rest, ``rho2 kappa`` is raised if the input is not bounded by the one that is given.
 
 Deadlines that were not tried are excluded by nothing but what holds for all gains of the protocol:
 :mod:`ptcc_certify.bounds.agents.shortest_time`.
+
+The search is bisection with secants in the logarithms of deadline and bound. Every candidate is proved, by
+:func:`~ptcc_certify.certificate.agents_part.prove_agents`, and compared with the limit exactly; it ends where a
+deadline keeps the limit and one that is shorter by a thousandth does not. The bound need not be monotone in the
+deadline: agents may fly towards each other.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from lmi.errors import NoCertificate
 from lmi.exact.decimal_rounding import up
 from ptcc_certify.bounds.agents.each_agent import scaled_states
 from ptcc_certify.bounds.agents.shortest_time import shortest_time
 from ptcc_certify.bounds.final_state.enclosed_ends import agents_ends
+from ptcc_certify.bounds.input.tightest_bound import log
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
+from ptcc_certify.certificate.agents_part import prove_agents
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.errors import Change, ParameterError, gated
-from ptcc_certify.gain_design.agents_answer import AgentsDesign
-from ptcc_certify.gain_design.agents_deadlines import Candidate, Search, at_deadline, longest
-from ptcc_certify.gain_design.answer import INFEASIBLE, MET, UNPROVED, refusal
+from ptcc_certify.gain_design.answer import INFEASIBLE, MET, UNPROVED, AgentsDesign, refusal
 from ptcc_certify.gain_design.request import Request
 from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.graphs.rationals import short_exact, shorten
 from ptcc_certify.model import NominalProtocol, Protocol
-from ptcc_certify.model.agents import Agents
+from ptcc_certify.model.agents import MOST_MOTION, Agents
 from ptcc_certify.model.asks import Asks, Expectations
 from ptcc_certify.model.parameters import parameter
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import Exact
+
+#: A deadline that is shorter by this share than the one that is found does not keep the limit.
+TOLERANCE = Fraction(1, 1000)
+#: Significant digits of deadlines and of ``rho1``.
+DIGITS = 7
+#: How often the deadline is doubled or halved until it is bracketed.
+_DOUBLINGS = 60
+#: The logarithm of the excess of what is not proved at all.
+_HOPELESS = 700.0
 
 
 @gated
@@ -125,7 +142,7 @@ def design_agents(
     search = Search(base, agents, template, request)
     if request.deadline is not None or part.in_place:  # agents in place need no input, nor more time
         candidate = search.at(first)
-        if candidate is None or not candidate.meets(request):
+        if candidate is None or not request.met_by(candidate):
             return _without(blank, search, candidate)
     else:
         search.run(blank.shortest_possible or first)
@@ -208,7 +225,7 @@ def _with(blank: AgentsDesign, candidate: Candidate, base: Certificate, again: C
     """Return the answer with a certificate: the one that certify makes by itself, if it meets what is asked."""
     asked = blank.asked
     own = None if again.proof.agents is None else Candidate(candidate.deadline, candidate.protocol, again.proof.agents)
-    repeatable = own is not None and own.meets(asked) and again.verdict == "certified"
+    repeatable = own is not None and asked.met_by(own) and again.verdict == "certified"
     if own is None or not repeatable:
         own, changes = candidate, {"protocol": candidate.protocol, "agents": candidate.part}
         again = base.changed(**changes, expectations=Expectations(max_input=asked.max_input))
@@ -254,3 +271,127 @@ def _without(answer: AgentsDesign, search: Search, nearest: Candidate | None) ->
         "no longer deadline that was tried keeps it" if best is None else f"T = {short_exact(best.deadline)} keeps it"
     )
     return replace(answer, binding=f"{text}; {mend}", peak=nearest.peak, residual=nearest.residual)
+
+
+# ---------------------------------------------------------------------- the search
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A deadline, and what is proved of it."""
+
+    deadline: Fraction
+    protocol: Protocol
+    part: AgentsAnswer
+
+    @cached_property
+    def peak(self) -> Fraction | None:
+        """The largest bound of an input; None if none is proved."""
+        return None if self.part.inputs is None else max(self.part.inputs)
+
+    @cached_property
+    def residual(self) -> Fraction | None:
+        """The largest deviation of a position at the deadline; None if none is proved."""
+        if self.part.protocol.gain_cap is None or self.part.alone:
+            return Fraction(0)
+        return None if self.part.residual is None else max(row[0] for row in self.part.residual.agents)
+
+    def excess(self, request: Request) -> Fraction | None:
+        """Return what is proved over what is asked, the larger of two; at most 1 if it is met, None if it is open."""
+        if self.peak is None or self.residual is None:
+            return None
+        beyond = self.residual / request.residual if request.residual else Fraction(0)
+        return max(self.peak / request.max_input, beyond)
+
+
+def at_deadline(protocol: Protocol, T: Fraction) -> Protocol:
+    """Return a protocol with another deadline: ``rho1 T`` is kept, but for rounding, and so are shares of ``T``.
+
+    Examples
+    --------
+    >>> from ptcc_certify.gain_design.deadline_search import at_deadline
+    >>> at_deadline(NominalProtocol(T=1, rho1=1, rho2=3, kappa=2), Fraction(4))
+    NominalProtocol(T=4, rho1=0.25, rho2=3, kappa=2)
+    """
+    share = T / protocol.T
+    rho1, reaching = Fraction(up(protocol.rho1 / share, DIGITS)), protocol.reaching
+    if reaching is None:
+        return protocol.replace(T=T, rho1=rho1)
+    T_r = min(Fraction(up(reaching.T_r * share, DIGITS)), T * (1 - Fraction(1, 10**DIGITS)))
+    return protocol.replace(T_r=T_r, T_s=T - T_r, rho1=rho1)
+
+
+def longest(agents: Agents) -> Fraction:
+    """Return the longest deadline of agents that move by themselves; that of others is as good as without a limit."""
+    if not any(agents.coefficients):
+        return Fraction(2) ** _DOUBLINGS
+    return MOST_MOTION / (1 + max(map(abs, agents.coefficients)))
+
+
+@dataclass
+class Search:
+    """The search of a deadline: candidates by their deadlines, each proved once."""
+
+    base: Certificate
+    agents: Agents
+    template: Protocol
+    request: Request
+    tried: dict[Fraction, Candidate | None] = field(default_factory=dict)
+
+    def at(self, T: Fraction) -> Candidate | None:
+        """Return what is proved of a deadline; None if no matrix is found."""
+        if T not in self.tried:
+            self.tried[T] = self._prove(T)
+        return self.tried[T]
+
+    def _prove(self, T: Fraction) -> Candidate | None:
+        first, protocol = self.base.proof.agents, at_deadline(self.template, T)
+        assert first is not None
+        try:
+            states = first.protocol.offsets, first.initial_state
+            part = prove_agents(self.base.graph_proof, protocol, self.agents, *states)
+        except NoCertificate:
+            return None
+        return Candidate(T, protocol, part)
+
+    def run(self, start: Fraction) -> None:
+        """Bracket the limit from a first deadline on, and narrow it down to the tolerance."""
+        from scipy.optimize import brentq
+
+        most = log(longest(self.agents))
+        ends = [min(log(start), most)]
+        outside = self.margin(ends[0]) > 0
+        for _ in range(_DOUBLINGS):
+            following = ends[-1] + (math.log(2) if outside else -math.log(2))
+            if ends[-1] == most and outside:
+                return
+            ends.append(min(following, most))
+            if (self.margin(ends[-1]) > 0) != outside:
+                break
+        else:
+            return
+        brentq(self.margin, *sorted(ends[-2:]), xtol=float(TOLERANCE) / 2)
+
+    def margin(self, z: float) -> float:
+        """Return the logarithm of what is proved over what is asked, at the deadline ``e^z``."""
+        candidate = self.at(Fraction(up(math.exp(z), DIGITS)))
+        excess = None if candidate is None else candidate.excess(self.request)
+        return _HOPELESS if excess is None else min(max(log(excess), -_HOPELESS), _HOPELESS)
+
+    @property
+    def best(self) -> Candidate | None:
+        """The shortest deadline that is proved to meet what is asked."""
+        met = [c for c in self.tried.values() if c is not None and self.request.met_by(c)]
+        return min(met, key=lambda c: c.deadline, default=None)
+
+    @property
+    def nearest(self) -> Candidate | None:
+        """The candidate that exceeds what is asked least."""
+        found = [(c.excess(self.request), c) for c in self.tried.values() if c is not None]
+        return min(((x, c) for x, c in found if x is not None), key=lambda pair: pair[0], default=(0, None))[1]
+
+    @property
+    def too_short(self) -> Fraction | None:
+        """The longest deadline tried that is shorter than the best one."""
+        best = self.best
+        return None if best is None else max((T for T in self.tried if best.deadline > T), default=None)

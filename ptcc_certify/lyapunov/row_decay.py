@@ -28,7 +28,7 @@ import numpy as np
 
 from lmi.dyadic import dyadic_array
 from lmi.exact.elementary_enclosures import rounded
-from lmi.sparse_h_matrix import DIRECT_ROWS, diagonal_factor, solve
+from lmi.sparse_h_matrix import positive_vector, smallest_eigenvalue
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import analyse, find_camps
 from ptcc_certify.lyapunov.dominance import round_array
@@ -39,10 +39,6 @@ from ptcc_certify.theorems.family_kernel import reached
 _ROUNDS, _TRIALS = 40, 24
 #: Relative distance of the search from the smallest eigenvalue, and at which it ends.
 _NEAR, _TOLERANCE = 1e-6, 1e-3
-#: Inverse iteration ends when its bound gains less than this, relatively.
-_GAIN = 1e-9
-#: Residual of a solve that leaves a witness what it is, over the root of the rows.
-_RESIDUAL = 0.05
 #: Strong components of more than one node in which the slowest member is looked for.
 _COMPONENTS = 50
 
@@ -201,13 +197,8 @@ def _extended(rows: IntervalRows, d: np.ndarray) -> np.ndarray:
 
 def _vector(rows: IntervalRows, t: float, policy: Policy) -> tuple[np.ndarray | None, Policy]:
     """Return ``d`` that proves a rate above ``t``, or None, and the last policy: refused, its member is slower."""
-    ones = np.ones(rows.n)
-    loose = _RESIDUAL / np.sqrt(rows.n)
     for _ in range(_ROUNDS):
-        M, _ = rows.system(policy)
-        diagonal = M.diagonal()
-        shifted = M - t * _identity(rows.n)
-        d = solve(shifted, ones, np.maximum(diagonal - t, diagonal * 1e-3 + 1e-300), loose)
+        d = positive_vector(rows.system(policy)[0], t)
         if not (np.isfinite(d).all() and (d > 0).all() and d.max() < 1e250 * d.min()):
             return None, policy
         if (rows.pull(_extended(rows, d)) >= t * d).all():
@@ -219,18 +210,12 @@ def _vector(rows: IntervalRows, t: float, policy: Policy) -> tuple[np.ndarray | 
     return None, policy
 
 
-def _identity(n: int) -> Any:
-    from scipy import sparse
-
-    return sparse.eye_array(n, format="csr")
-
-
 def _largest_rate(rows: IntervalRows) -> tuple[float, list[Policy]] | None:
     """Return a rate just below the largest, and policies of members that are slow; None if none is positive."""
     policy = rows.worst(_extended(rows, np.ones(rows.n)))
     low, refused = 0.0, policy
     for _ in range(_ROUNDS):
-        found = _smallest(rows.system(policy)[0])
+        found = smallest_eigenvalue(rows.system(policy)[0], shifted=True)
         if found is None:
             return None
         high = found[0] * (1 - _NEAR)
@@ -288,7 +273,7 @@ def _rate_of_member(rows: IntervalRows, policy: Policy) -> Fraction | None:
     best = None
     for own in candidates:
         y = np.zeros(rows.n + rows.outside, dtype=object)
-        found = _smallest(M[own][:, own])
+        found = smallest_eigenvalue(M[own][:, own], shifted=True)
         if found is None:
             continue
         y[own] = dyadic_array(round_array(found[1]))[0].astype(object)
@@ -296,33 +281,3 @@ def _rate_of_member(rows: IntervalRows, policy: Policy) -> Fraction | None:
         bound = -least_quotient(-pull, y[own]) * rows.unit
         best = bound if best is None or bound < best else best
     return None if best is None else rounded(best, 53, up=True)
-
-
-def _smallest(M: Any) -> tuple[float, np.ndarray] | None:
-    """Bound the smallest eigenvalue of an M-matrix from below by inverse iteration, in floats, with its last vector.
-
-    Up to ``DIRECT_ROWS`` rows the bound itself shifts the next solve (Noda's iteration). None if no positive bound is
-    found.
-    """
-    diagonal, n = M.diagonal(), M.shape[0]
-    if not (diagonal > 0).all():
-        return None
-    y, best = np.ones(n), np.ones(n)
-    low = 0.0
-    for _ in range(_ROUNDS):
-        try:
-            if n <= DIRECT_ROWS:
-                y = diagonal_factor(M - low * (1 - _GAIN) * _identity(n)).solve(y)
-            else:
-                y = solve(M, y, diagonal)
-        except RuntimeError:  # exactly singular
-            break
-        y = np.abs(y) / np.abs(y).max()
-        if not (y > 0).all():
-            break
-        before, bound = low, float(((M @ y) / y).min())
-        if bound > low:
-            low, best = bound, y
-        if low > 0 and low - before <= _GAIN * low:
-            break
-    return (low, best) if low > 0 else None

@@ -7,7 +7,7 @@ docs/theory/families.md, "Common quadratic functions" and "Uncertain weights".
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -18,6 +18,7 @@ from lmi.definiteness_proofs import prove_generalized_margin
 from lmi.exact import arithmetic
 from lmi.exact.numbers import integers
 from ptcc_certify.checker.common_forms import Scaled
+from ptcc_certify.checker.common_kernel_ends import WeightedMean
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.lyapunov.quotient import Quotient, QuotientMode
 from ptcc_certify.theorems.matrix_arithmetic import Matrix, integer_matrix, integer_rows
@@ -31,7 +32,7 @@ _NEARLY_ZERO = (1e-9, 1e-7, 1e-5)
 
 
 @dataclass(frozen=True, eq=False)
-class FamilyFunction:
+class CommonForm:
     """``V = xi' P xi`` of a family in its quotient coordinates; for every signal ``V <= e^(-rate s) V(0)``.
 
     More closely ``V(s) <= V(0) e^(-sum_i rates_i s_i)``, where the signal spends the part ``s_i`` of the clock in mode
@@ -41,8 +42,8 @@ class FamilyFunction:
     ----------
     kind : {"full", "diagonal", "undirected"}
         ``undirected``: ``P`` is the square of the distance to the states at rest, weighted by ``left_vector``.
-    pivots, nodes : tuple of int
-        See :class:`~ptcc_certify.lyapunov.quotient.Quotient`.
+    quotient : Quotient
+        Its coordinates.
     matrix : n rows of n Fraction
         ``P``, positive definite.
     rates : tuple of Fraction
@@ -63,13 +64,12 @@ class FamilyFunction:
         ``xi_k^2 <= coordinate_constants[k] V``.
     numerical_rate : float or None
         Of the search, before the matrix was rounded.
-    means : tuple of (tuple of N Fraction, Fraction)
-        Vectors ``q``, each with a constant: ``|q' L X|^2 <= constant V`` for every member.
+    means : tuple of WeightedMean
+        Of leading groups: ``|q' L X|^2 <= constant V`` for every member.
     """
 
     kind: str
-    pivots: tuple[int, ...]
-    nodes: tuple[int, ...]
+    quotient: Quotient
     matrix: Matrix
     rates: tuple[Fraction, ...]
     multipliers: tuple[tuple[Fraction, ...], ...]
@@ -80,7 +80,12 @@ class FamilyFunction:
     input_constants: tuple[Fraction, ...] = ()
     coordinate_constants: tuple[Fraction, ...] = ()
     numerical_rate: float | None = None
-    means: tuple[tuple[tuple[Fraction, ...], Fraction], ...] = ()
+    means: tuple[WeightedMean, ...] = ()
+
+    @property
+    def nodes(self) -> tuple[int, ...]:
+        """The nodes that have a coordinate."""
+        return self.quotient.nodes
 
     @property
     def rate(self) -> Fraction:
@@ -92,23 +97,25 @@ class FamilyFunction:
         """``highest / lowest``, which multiplies the squared norm of ``xi``."""
         return self.highest / self.lowest
 
-    @property
-    def deviation_constants(self) -> tuple[Fraction, ...] | None:
-        """``(x_k - x_k(T))^2 <= deviation_constants[k] V``, from the integral of ``|x_k'|``; None if nothing decays."""
-        if self.rate <= 0:
-            return None
-        return tuple(4 * c / self.rate**2 for c in self.input_constants)
+    @cached_property
+    def speeds(self) -> list[Scaled]:
+        """Bounds of ``|(L X)_k| / sqrt(V)`` for every member: integers by node, and what multiplies them."""
+        return [_roots(range(len(self.input_constants)), self.input_constants)]
 
     @cached_property
-    def speeds(self) -> Scaled:
-        """Bounds of ``|(L X)_k| / sqrt(V)`` for every member: integers by node, and what multiplies them."""
-        (values,), scale = integers([[root_above(c) for c in self.input_constants]])
-        return dict(enumerate(values)), Fraction(1, scale)
+    def sizes(self) -> list[Scaled]:
+        """Bounds of ``|xi_k| / sqrt(V)``."""
+        return [_roots(self.nodes, self.coordinate_constants)]
 
-    def largest(self, sizes: Sequence[Fraction]) -> Fraction:
-        """Bound ``V`` of all quotient coordinates with ``|xi_k| <= sizes_k``, by entries."""
-        rows = (sum((abs(p) * b for p, b in zip(row, sizes, strict=True)), Fraction(0)) for row in self.matrix)
-        return sum((b * total for b, total in zip(sizes, rows, strict=True)), Fraction(0))
+    def root(self, x: Sequence[Fraction]) -> Fraction:
+        """Bound ``sqrt(V)`` of a state."""
+        return root_above(self.value(self.quotient.coordinates(x)))
+
+    def largest(self, sizes: Mapping[int, Fraction]) -> Fraction:
+        """Bound ``V`` of all states with ``|x_k| <= sizes_k``, by entries."""
+        own = self.quotient.coordinate_sizes(sizes)
+        rows = (sum((abs(p) * b for p, b in zip(row, own, strict=True)), Fraction(0)) for row in self.matrix)
+        return sum((b * total for b, total in zip(own, rows, strict=True)), Fraction(0))
 
     def value(self, xi: Sequence[Fraction]) -> Fraction:
         """Return ``V`` of quotient coordinates."""
@@ -197,8 +204,14 @@ def prove_ends(P: Matrix) -> tuple[Fraction, Fraction] | None:
 # ---------------------------------------------------------------------- constants
 
 
-def with_constants(function: FamilyFunction, quotient: Quotient) -> FamilyFunction:
-    """Add the constants of inputs and coordinates; see :class:`FamilyFunction`.
+def _roots(nodes: Iterable[int], constants: Sequence[Fraction]) -> Scaled:
+    """Return square roots, rounded up: integers by node, and what multiplies them."""
+    (values,), scale = integers([[root_above(c) for c in constants]])
+    return dict(zip(nodes, values, strict=True)), Fraction(1, scale)
+
+
+def with_constants(function: CommonForm) -> CommonForm:
+    """Add the constants of inputs and coordinates; see :class:`CommonForm`.
 
     With ``y`` the row ``k`` of ``L_0 C^r`` and ``|z| = sqrt(z' P^-1 z)``, every member has
     ``|(L X)_k| <= (|y| + sum_e radius_e |effect_ek| |h_e|) sqrt(V)``.
@@ -207,7 +220,7 @@ def with_constants(function: FamilyFunction, quotient: Quotient) -> FamilyFuncti
     ----------
     docs/theory/families.md, "Inputs".
     """
-    n = len(function.nodes)
+    n, quotient = len(function.nodes), function.quotient
     vectors: dict[tuple[Fraction, ...], int] = {}
     for mode in quotient.modes:
         for row in (*mode.rows, *(part.h for part in mode.parts)):
@@ -233,10 +246,11 @@ def with_constants(function: FamilyFunction, quotient: Quotient) -> FamilyFuncti
     )
 
 
-def mean_constant(function: FamilyFunction, quotient: Quotient, q: Sequence[Fraction]) -> Fraction | None:
+def mean_constant(function: CommonForm, q: Mapping[int, Fraction]) -> Fraction | None:
     """Return a constant with ``|q' L X|^2 <= constant V`` for every member; None if ``P > 0`` is not proved.
 
-    With ``|z| = sqrt(z' P^-1 z)``, ``|q' L X| <= (|q' L_0 C^r| + sum_e radius_e |q' effect_e| |h_e|) sqrt(V)``.
+    ``q`` is by nodes, 0 of others. With ``|z| = sqrt(z' P^-1 z)``,
+    ``|q' L X| <= (|q' L_0 C^r| + sum_e radius_e |q' effect_e| |h_e|) sqrt(V)``.
 
     References
     ----------
@@ -247,16 +261,16 @@ def mean_constant(function: FamilyFunction, quotient: Quotient, q: Sequence[Frac
     >>> from ptcc_certify.graphs.family import Family
     >>> from ptcc_certify.lyapunov.common_left_vector import undirected_function
     >>> pair = Quotient(Family.from_intervals([("a", "b", 1, 3)], undirected=True))
-    >>> mean_constant(undirected_function(pair), pair, [Fraction(1), Fraction(1)])
+    >>> mean_constant(undirected_function(pair), {0: Fraction(1), 1: Fraction(1)})
     Fraction(0, 1)
     """
     zero = Fraction(0)
     terms = []
-    for mode in quotient.modes:
+    for mode in function.quotient.modes:
         columns = zip(*mode.rows, strict=True)
-        own = [(Fraction(1), [sum((w * r for w, r in zip(q, c, strict=True) if w and r), zero) for c in columns])]
+        own = [(Fraction(1), [sum((w * c[k] for k, w in q.items() if c[k]), zero) for c in columns])]
         for part in mode.parts:
-            if size := abs(sum((q[k] * sign for k, sign in part.effect.items()), zero)):
+            if size := abs(sum((q.get(k, zero) * sign for k, sign in part.effect.items()), zero)):
                 own.append((part.radius * size, list(part.h)))
         terms.append(own)
     squares = inverse_forms(function.matrix, [vector for own in terms for _, vector in own])
@@ -264,6 +278,21 @@ def mean_constant(function: FamilyFunction, quotient: Quotient, q: Sequence[Frac
         return None
     norms = iter([root_above(y) for y in squares])
     return max(sum((factor * next(norms) for factor, _ in own), zero) for own in terms) ** 2
+
+
+def weighted_mean(quotient: Quotient, q: Mapping[int, Fraction], constant: Fraction) -> WeightedMean:
+    """Return a weighted mean of a leading group, by nodes, with its constant.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.family import Family
+    >>> pair = Quotient(Family.from_intervals([("a", "b", -1, -1), ("b", "a", -1, -1)]))
+    >>> weighted_mean(pair, {0: Fraction(1, 2), 1: Fraction(-1, 2)}, Fraction(0)).size
+    Fraction(1, 1)
+    """
+    codes = {v: int(quotient.kernel.codes[v]) for v in sorted(q)}
+    size = sum((q[v] if code > 0 else -q[v] for v, code in codes.items()), Fraction(0))
+    return WeightedMean(abs(codes[min(q)]) - 1, {v: q[v] for v in codes}, size, constant)
 
 
 def inverse_forms(P: Matrix, vectors: Sequence[Sequence[Fraction]]) -> list[Fraction] | None:

@@ -26,9 +26,9 @@ from lmi.errors import LMIError, NoCertificate, OutOfTime
 from lmi.search_time import checkpoint, part_of_time, share_of_time
 from ptcc_certify.checker.matrix_products import LARGEST_ROWS, WITH_MULTIPLIERS
 from ptcc_certify.graphs.size_limits import EXACT_NODES
+from ptcc_certify.lyapunov.common_forms import CommonForm, prove_ends, prove_mode, with_constants
 from ptcc_certify.lyapunov.common_left_vector import undirected_function
 from ptcc_certify.lyapunov.error_system import rounded_matrix
-from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends, prove_mode, with_constants
 from ptcc_certify.lyapunov.quotient import Quotient
 
 #: Classes of functions.
@@ -53,7 +53,7 @@ class FamilySearch:
 
     Attributes
     ----------
-    functions : tuple of FamilyFunction
+    functions : tuple of CommonForm
         Proved; the largest rate first, that of the slowest mode in which something moves.
     notes : tuple of str
         What failed, and why.
@@ -61,12 +61,12 @@ class FamilySearch:
         What the time limit cut short.
     """
 
-    functions: tuple[FamilyFunction, ...] = ()
+    functions: tuple[CommonForm, ...] = ()
     notes: tuple[str, ...] = ()
     cut_off: tuple[str, ...] = ()
 
 
-def search_family(
+def search_common_forms(
     quotient: Quotient,
     kinds: Sequence[str] = KINDS,
     enough: Fraction | None = None,
@@ -105,7 +105,7 @@ def search_family(
     >>> from ptcc_certify.theorems.family_behaviour import decide
     >>> day = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)])
     >>> night = SignedDigraph.from_edges([("c", "a", -2), ("a", "b", 1)])
-    >>> best = search_family(Quotient.of(decide(Family.switching([day, night]))[0])).functions[0]
+    >>> best = search_common_forms(Quotient.of(decide(Family.switching([day, night]))[0])).functions[0]
     >>> round(float(best.rate), 2), len(best.rates), float(best.rates[1]) >= float(best.rate)
     (0.96, 2, True)
     """
@@ -114,7 +114,7 @@ def search_family(
         return FamilySearch(notes=(f"{n} agents are above the {CLOSED_ROWS} of the searches",))
     if not n or all(mode.at_rest for mode in quotient.modes):
         return FamilySearch()
-    functions: list[FamilyFunction] = []
+    functions: list[CommonForm] = []
     notes: list[str] = []
     cut_off: list[str] = []
     if "undirected" in kinds:
@@ -153,7 +153,7 @@ def search_family(
     return FamilySearch(tuple(functions), tuple(notes), tuple(cut_off))
 
 
-def _closed_function(quotient: Quotient, cut_off: list[str]) -> FamilyFunction | None:
+def _closed_function(quotient: Quotient, cut_off: list[str]) -> CommonForm | None:
     """Return a full matrix that Lyapunov equations give; None if its rate is not positive.
 
     It takes little time, and so comes first: what is searched for longer may be cut off.
@@ -166,7 +166,7 @@ def _closed_function(quotient: Quotient, cut_off: list[str]) -> FamilyFunction |
     return None
 
 
-def _worth(quotient: Quotient, V: FamilyFunction, shares: Sequence[float] | None) -> Fraction:
+def _worth(quotient: Quotient, V: CommonForm, shares: Sequence[float] | None) -> Fraction:
     """Return the mean of the rates over the shares, or the least rate of the modes in which something moves."""
     if shares is not None:
         return sum((Fraction(s) * rate for s, rate in zip(shares, V.rates, strict=True)), Fraction(0)) / Fraction(
@@ -177,7 +177,7 @@ def _worth(quotient: Quotient, V: FamilyFunction, shares: Sequence[float] | None
 
 def _common_functions(
     quotient: Quotient, kind: str, notes: list[str], shares: Sequence[float] | None, losses: Sequence[float]
-) -> Iterator[FamilyFunction]:
+) -> Iterator[CommonForm]:
     """Yield the function of the largest rate, then slower ones whose overshoot constants are much smaller."""
     moving = [number for number, mode in enumerate(quotient.modes) if not mode.at_rest]
     arrays = [quotient.modes[number].array for number in moving]
@@ -211,7 +211,7 @@ def _common_functions(
 
 def prove_certificate(
     quotient: Quotient, kind: str, certificate: CommonCertificate, moving: Sequence[int]
-) -> FamilyFunction | None:
+) -> CommonForm | None:
     """Round a matrix and multipliers of the modes ``moving``, and prove their rates; None if a step fails."""
     P, top = certificate.matrix, float(np.abs(certificate.matrix).max())
     matrix = rounded_matrix(np.diag(np.diag(P)) if kind == "diagonal" else P, _MATRIX_BITS)
@@ -228,14 +228,13 @@ def prove_certificate(
         if rate is None:
             return None
         rates[number] = rate
-    function = FamilyFunction(
+    function = CommonForm(
         kind,
-        quotient.pivots,
-        quotient.nodes,
+        quotient,
         matrix,
         tuple(rates),
         tuple(multipliers),
         *ends,
         numerical_rate=certificate.rate,
     )
-    return with_constants(function, quotient)
+    return with_constants(function)
