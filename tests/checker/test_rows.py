@@ -22,8 +22,8 @@ MANY, LONG = 40_000, 10**3990
         lambda rows: rows.decay(Fraction(2), Fraction(LONG, 2 * LONG + 1)),
         lambda rows: rows.above_floor(Fraction(LONG + 1, LONG), Fraction(1)),
         lambda rows: rows.above_floor(Fraction(1), Fraction(LONG)),
-        lambda rows: rows.followers.never_grows([1] * MANY, Fraction(1, LONG)),
-        lambda rows: rows.followers.never_grows([1] * MANY, Fraction(LONG)),
+        lambda rows: rows.followers.need_outweighed([1] * MANY, Fraction(1), Fraction(1, LONG), Fraction(0), ""),
+        lambda rows: rows.followers.need_outweighed([1] * MANY, Fraction(1), Fraction(LONG), Fraction(0), ""),
     ],
 )
 def test_long_numbers_of_many_followers_are_refused_before_rows_are_formed(verify: Callable[[Rows], None]):

@@ -108,7 +108,7 @@ def test_the_list_is_what_the_checker_imports():
 
 
 def test_each_file_of_the_list_is_there_once():
-    arrays = [f"ptcc_certify/checker/array_{name}.py" for name in ("digraph", "late_steps")]
+    arrays = [f"ptcc_certify/checker/array_{name}.py" for name in ("digraph", "stepwise_bounds")]
     assert ["lmi/exact/fast.py", *arrays] == TWINS and ALL[-3:] == TWINS
     assert len(set(ALL)) == len(ALL) and all((ROOT / name).is_file() for name in ALL)
 
