@@ -107,6 +107,7 @@ def every_class(sliding_first: bool) -> list[Any]:
     return [pytest.param(*case, marks=() if case in now else pytest.mark.campaign) for case in both]
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(("name", "slides"), every_class(False))
 def test_every_class_is_accepted_by_both_arithmetics(name: str, slides: bool):
     data = made(name, 3 + slides, slides)
@@ -202,6 +203,7 @@ def test_a_graph_that_floats_cannot_solve_is_undecided_and_accepted_as_such():
 LONG_FINAL_STATES = ("1.1", "2.1 K>=2", "2.1 K=1", "3.1 mixed", "3.1 all single", "disconnected 1.1 2.1")
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("name", "slides"), thinned(product(LONG_FINAL_STATES, (False, True)), 5))
 def test_an_final_state_too_long_to_write_is_enclosed(name: str, slides: bool, monkeypatch: pytest.MonkeyPatch):
     """Where exact numbers would be too long, balls are proved instead; here whatever is no decimal fraction."""
@@ -514,7 +516,7 @@ def test_a_rate_above_the_spectral_rate(name: str):
         rejected(forged, rf"rate of lyapunov\.functions\[{k}\]")
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", ["1.1", "1.2", "2.1 K>=2", "2.2", "3.1 mixed", "3.2"])
 def test_a_limit_below_the_spectral_rate(name: str):
     """Nor is a limit accepted that some eigenvalue contradicts."""
@@ -653,6 +655,7 @@ def test_one_end_of_rho_without_the_other_is_rejected():
         rejected(changed(forged, ("proof", step, "numbers"), left), "rho-interval of paper")
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("gains", "size"),
     thinned(
@@ -721,6 +724,7 @@ def side_vectors(value: Any, path: tuple[str | int, ...] = ()) -> list[tuple[str
     return [found for key, item in items for found in side_vectors(item, (*path, key))]
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(("name", "slides"), every_class(True))
 def test_every_class_is_accepted_with_vectors_beside_it(name: str, slides: bool):
     """In the large form, by lists and by arrays; with the arrays alone too."""
@@ -832,6 +836,7 @@ def test_no_mutant_of_a_certificate_with_side_files_is_accepted(name: str, slide
 # ---------------------------------------------------------------------- factors of leader groups
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("aside", [False, True])
 @pytest.mark.parametrize("name", thinned(["1.1", "1.2", "2.2", "2.1 K>=2", "3.1 mixed", "3.2", "3.1 no single"], 2))
 def test_groups_are_proved_by_factors(name: str, aside: bool):
@@ -1052,6 +1057,7 @@ def test_few_long_entries_of_a_large_matrix_are_refused_before_it_is_formed():
     tracemalloc.stop()
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("piece", thinned(["[]", '"a"', "{}", '{"a":1}', "257", "[[1.5]]"], 3))
 def test_json_that_would_fill_the_memory_is_refused_before_it_is_parsed(piece: str, tmp_path: Path):
     path = tmp_path / "c.json"

@@ -35,7 +35,7 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.simulation.late_messages import simulate_late
 
-pytestmark = pytest.mark.usefixtures("framed_figures")
+pytestmark = pytest.mark.usefixtures("framed_figures", "quick_search")
 
 TEAM = "source,target,weight,delay\na,b,1,0.01\nb,c,1,0.02\nc,b,1,0.01\nc,d,-2,0.005\n"
 CHAIN = "source,target,weight\na,b,1\nb,c,-1\n"
@@ -132,6 +132,7 @@ def test_no_delay_is_told_that_the_check_does_not_accept(monkeypatch: pytest.Mon
     assert "older" not in ptcc("certify", *words).out
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -202,7 +203,7 @@ def test_followers_track_leaders_that_move_and_the_file_says_so() -> None:
     assert "ever after" in sign.out
 
 
-@pytest.mark.few(3)  # one of each option
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("rows", "words"),
     [
@@ -489,6 +490,7 @@ def table(text: str) -> dict[str, np.ndarray]:
     return dict(zip(head, np.array(rows, dtype=float).T, strict=True))
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("words", "messages", "pattern"),
     [
@@ -534,6 +536,7 @@ def test_simulate_runs_leaders_that_move_with_their_targets() -> None:
     )
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("words", [("--delay", "0.1"), ("--leader-speed", "1")])
 def test_simulate_draws_such_runs_and_takes_them_from_a_scenario(words: tuple[str, ...]) -> None:
     assert ptcc("simulate", "team.csv", *words, *START, "-o", "run.png").code == 0
@@ -907,6 +910,7 @@ def test_a_sign_term_takes_up_how_leaders_move_where_messages_are_late_too() -> 
     assert ptcc("plot", "s.json", "-o", "s.svg").code == 0
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     "words",
     [
