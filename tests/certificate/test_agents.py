@@ -172,7 +172,7 @@ BESIDE: dict[str, tuple[Any, dict[str, Any]]] = {
 }
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(7)  # each once
 @pytest.mark.parametrize("name", BESIDE)
 @pytest.mark.parametrize("graph", [TEAM, CAMPS], ids=["team", "camps"])
 def test_single_integrators_in_a_formation_have_the_plain_certificate_of_their_places(

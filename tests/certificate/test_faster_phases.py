@@ -97,7 +97,6 @@ def times(factor: Any) -> Callable[[str], str]:
     return lambda text: str(F(text) * F(factor))
 
 
-@pytest.mark.few(8)
 @pytest.mark.parametrize(
     ("path", "change", "reason"),
     [

@@ -75,7 +75,7 @@ def rejected(data: Json, where: str, reason: str) -> None:
         assert reason in (report.reason or ""), (report.rejected, report.reason)
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(3)
 @pytest.mark.parametrize("name", SETTINGS)
 def test_every_kind_of_cascade_is_accepted_and_has_the_shape_of_the_schema(name: str):
     data = made(name)

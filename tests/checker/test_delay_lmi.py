@@ -36,7 +36,7 @@ def scaled(text: str, factor: Fraction) -> str:
     return str(number(text) * factor)
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(2)
 @pytest.mark.parametrize(("seed", "own"), CASES)
 def test_what_is_made_is_accepted_by_both_arithmetics_and_kept_to_by_motions(seed: int, own: bool):
     data = whole(seed, own)
@@ -81,7 +81,6 @@ def test_a_multiplier_of_an_edge_that_is_not_late_is_refused():
         assert "tau is positive iff" in reason(data, (*step, "witness", "tau", k), "1")
 
 
-@pytest.mark.few(2)
 @pytest.mark.parametrize(("seed", "own"), CASES)
 def test_bounds_below_what_is_proved_are_refused(seed: int, own: bool):
     data = whole(seed, own)

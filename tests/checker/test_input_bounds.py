@@ -275,7 +275,7 @@ def test_limits_at_the_edges():
             bound(gain)
 
 
-@pytest.mark.few(25)
+@pytest.mark.few(20)
 @pytest.mark.parametrize("last", [1, 3, 2000])
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_held_gain_leaves_no_more_than_what_its_periods_leave_together(

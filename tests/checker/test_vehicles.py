@@ -158,7 +158,6 @@ def false_claims(data: Json) -> list[str]:
 # ---------------------------------------------------------------------- what is true is accepted
 
 
-@pytest.mark.few(5)
 @pytest.mark.parametrize("name", CASES)
 def test_every_combination_is_proved_checked_with_and_without_arrays_and_read_back(name: str, tmp_path: Any):
     certificate, data = certified(1, name), document(1, name)

@@ -132,7 +132,6 @@ def test_no_delay_is_told_that_the_check_does_not_accept(monkeypatch: pytest.Mon
     assert "older" not in ptcc("certify", *words).out
 
 
-@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -203,7 +202,7 @@ def test_followers_track_leaders_that_move_and_the_file_says_so() -> None:
     assert "ever after" in sign.out
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(3)  # one of each option
 @pytest.mark.parametrize(
     ("rows", "words"),
     [
@@ -490,7 +489,6 @@ def table(text: str) -> dict[str, np.ndarray]:
     return dict(zip(head, np.array(rows, dtype=float).T, strict=True))
 
 
-@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("words", "messages", "pattern"),
     [
@@ -536,7 +534,6 @@ def test_simulate_runs_leaders_that_move_with_their_targets() -> None:
     )
 
 
-@pytest.mark.few(1)
 @pytest.mark.parametrize("words", [("--delay", "0.1"), ("--leader-speed", "1")])
 def test_simulate_draws_such_runs_and_takes_them_from_a_scenario(words: tuple[str, ...]) -> None:
     assert ptcc("simulate", "team.csv", *words, *START, "-o", "run.png").code == 0
@@ -910,7 +907,6 @@ def test_a_sign_term_takes_up_how_leaders_move_where_messages_are_late_too() -> 
     assert ptcc("plot", "s.json", "-o", "s.svg").code == 0
 
 
-@pytest.mark.few(2)
 @pytest.mark.parametrize(
     "words",
     [
