@@ -35,7 +35,7 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.simulation.late_messages import simulate_late
 
-pytestmark = pytest.mark.usefixtures("framed_figures", "quick_search")
+pytestmark = pytest.mark.usefixtures("framed_figures")
 
 TEAM = "source,target,weight,delay\na,b,1,0.01\nb,c,1,0.02\nc,b,1,0.01\nc,d,-2,0.005\n"
 CHAIN = "source,target,weight\na,b,1\nb,c,-1\n"
