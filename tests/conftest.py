@@ -17,6 +17,9 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import pytest
 from hypothesis import settings
 
+from ptcc_certify.certificate import graph_certification
+from ptcc_certify.lyapunov import search
+
 # A shell lets what it runs in the background ignore Ctrl-C; tests send it to themselves and to their children.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -48,6 +51,23 @@ def framed_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     frames = {".svg": b'<svg viewBox="0 0 1 1"></svg>', ".pdf": b"%PDF"}
     for module in ("page_figures", "report_file"):
         monkeypatch.setattr(f"ptcc_certify.report.{module}.figure_bytes", lambda _, suffix: frames[suffix])
+
+
+@pytest.fixture
+def quick_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Certificates by closed forms where every class would be searched, for tests of all else: it takes a third."""
+    every = graph_certification.search_functions
+
+    def closed_forms(system: Any, method: str, *more: Any) -> Any:
+        return every(system, "perron" if method == "best" else method, *more)
+
+    monkeypatch.setattr(graph_certification, "search_functions", closed_forms)
+
+
+@pytest.fixture
+def every_class(quick_search: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Search every class after all, in a file whose other tests need none of that."""
+    monkeypatch.setattr(graph_certification, "search_functions", search.search_functions)
 
 
 @pytest.fixture(scope="session")

@@ -11,6 +11,8 @@ from asked import certify_words
 import ptcc_certify as ptcc
 from ptcc_certify.errors import UnknownAgentError
 
+pytestmark = pytest.mark.usefixtures("quick_search")
+
 GRAPH = ptcc.SignedDigraph.from_edges([("ann", "bob", -1), ("bob", "ann", -1), ("ann", "eve", 2)])
 PROTOCOL, X0 = ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), [3, 1, 2]
 FAMILY = ptcc.as_family([("ann", "bob", -1, -1), ("bob", "ann", -1, -1), ("ann", "eve", 1, 2)])

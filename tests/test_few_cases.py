@@ -23,6 +23,10 @@ def test_slow(case):
 def test_of_two(case):
     pass
 
+@pytest.mark.few(0)
+def test_again():
+    pass
+
 @pytest.mark.parametrize("case", range(2))
 def test_quick(case):
     pass
@@ -30,15 +34,15 @@ def test_quick(case):
 SLOW, OTHERS = [f"slow[{k}]" for k in range(6)], ["of_two[0]", "of_two[1]", "quick[0]", "quick[1]"]
 
 
-@pytest.mark.few(5)
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     ("options", "which", "left"),
     [
-        ((), [SLOW[0], SLOW[3], *OTHERS], 4),
-        (("-n", "2"), [SLOW[0], SLOW[3], *OTHERS], 4),
-        (("--all",), [*SLOW, *OTHERS], 0),
-        (("--turn", "1/4"), [SLOW[3], "quick[1]"], 4),
-        (("--all", "--turn", "1/4"), [SLOW[1], SLOW[5], "quick[1]"], 0),
+        ((), [SLOW[0], SLOW[3], *OTHERS], 5),
+        (("-n", "2"), [SLOW[0], SLOW[3], *OTHERS], 5),
+        (("--all",), [*SLOW, *OTHERS, "again"], 0),
+        (("--turn", "1/4"), [SLOW[3], "quick[1]"], 5),
+        (("--all", "--turn", "1/4"), [SLOW[1], SLOW[5], "quick[0]"], 0),
         (("-k", "slow and 5"), [SLOW[5]], 0),
     ],
 )

@@ -18,6 +18,8 @@ from scipy import sparse
 import ptcc_certify as ptcc
 from ptcc_certify.errors import PTCCError
 
+pytestmark = pytest.mark.usefixtures("quick_search")
+
 #: What is typed, and a part of what is shown: of a refusal, its class and beginning, or "... " and a part.
 CONTROL_RESEARCHER = {
     "ptcc.__version__": ".",

@@ -17,6 +17,8 @@ from ptcc_certify.model.disturbance import as_disturbance
 from ptcc_certify.model.gain import Gain
 from ptcc_certify.model.gain_limits import GainLimits
 
+pytestmark = pytest.mark.usefixtures("quick_search")
+
 TEAM = ptcc.as_graph([("ann", "bob", 2), ("bob", "ann", -1), ("bob", "eve", 1)])
 PROTOCOL = ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)
 ROBUST = ptcc.SlidingModeProtocol(delta="0.5")

@@ -259,6 +259,7 @@ DIRECT = ("--T", "0.6", "--rho2", "0.3", "--initial-bound", "1", "--simulation")
 SLIDES = ("--protocol", "sliding-mode", "--kappa", "3", "--sigma0", "random", "--disturbance", "telegraph")
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("options", "graph"), thinned(itertools.product((DIRECT, (*SLIDES, "--simulation")), ("fig1b", "fig5a")), 3)
 )

@@ -305,7 +305,7 @@ def test_a_run_that_never_rises_above_the_floor_judges_nothing():
     assert envelope.compare(simulate(graph, protocol, [3, 1])).judged > 10
 
 
-def test_margins_below_the_sight_of_the_solver_are_proved_from_closed_forms():
+def test_margins_below_the_sight_of_the_solver_are_proved_from_quick_search():
     """Unbalanced by an edge 10^11 times weaker: Lemma 3.2 by the left vector; weak followers block by block."""
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
     nearly = [(1, 2, 1), (2, 3, 1), (3, 1, 1), (3, 2, "-1e-11")]

@@ -184,7 +184,7 @@ def random_case(seed: int, by_edge: bool = False) -> Certificate:
     return certify(family, PROTOCOL, x0, **asked)  # type: ignore[no-any-return]
 
 
-@pytest.mark.few(7)
+@pytest.mark.few(4)
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("by_edge", [False, True], ids=["one delay", "edge by edge"])
 def test_no_adversary_leaves_more_than_is_certified(by_edge: bool, seed: int):
@@ -243,7 +243,7 @@ def certified(name: str, x0: tuple[int, ...] | None = (1, 2, -3)) -> Certificate
     return certify(UNSURE, PROTOCOL, x0, **BESIDE[name])  # type: ignore[no-any-return]
 
 
-@pytest.mark.few(9)
+@pytest.mark.few(4)
 @pytest.mark.parametrize("x0", [(1, 2, -3), None], ids=["state", "every state"])
 @pytest.mark.parametrize("name", BESIDE)
 def test_what_is_certified_is_read_back(name: str, x0: tuple[int, ...] | None, tmp_path: Path):

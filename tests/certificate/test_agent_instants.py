@@ -68,7 +68,7 @@ def deviations(part: AgentsPart | CascadePart) -> tuple[np.ndarray, np.ndarray]:
     return q, scaled * eta ** np.arange(part.order)[:, None] * np.exp(-run.rate * run.clock[known] / 2)
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("graph", "kind"), thinned(CASES, 3))  # every kind once, by turns on every graph
 def test_bounds_are_above_the_motion_and_at_99_percent_within_ten_times_of_it(graph: str, kind: str):
     part = part_of(made(graph, kind))
@@ -82,7 +82,7 @@ def test_bounds_are_above_the_motion_and_at_99_percent_within_ten_times_of_it(gr
     assert (bound <= without).all() and np.linalg.norm(bound[:, 0, at]) < np.linalg.norm(without[:, 0, at])
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 @pytest.mark.parametrize("kind", KINDS)
 def test_agents_are_where_they_are_enclosed(kind: str):
     """The motion in original coordinates, by an explicit integrator of high order."""
@@ -130,6 +130,7 @@ def less(rows: list[Any], i: int) -> list[Any]:
     return rows
 
 
+@pytest.mark.few(8)
 @pytest.mark.parametrize("kind", ["at rest", "cascade"])
 @pytest.mark.parametrize(
     ("change", "reason"),

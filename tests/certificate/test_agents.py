@@ -78,6 +78,7 @@ def holds(certificate: Certificate, comparison: Any) -> None:
     assert np.abs(end - claimed).max() <= 1e-7 * max(1.0, np.abs(end).max())
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("seed", range(4))
 def test_bounds_hold_on_random_graphs_and_agents(seed: int):
     holds(*seen(seed))
@@ -222,7 +223,7 @@ def test_bounds_of_a_formation_under_a_cap_hold_on_the_motion_that_agents_of_ord
     assert left.largest <= max(part.input) * (1 + Fraction(1, 10**9))
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", BESIDE)
 def test_runs_of_a_formation_tell_positions(name: str):
     """What is asked and the run beside the bounds begin at ``x0``, and differ from ``x - h`` by ``h`` at any time."""
@@ -382,7 +383,7 @@ STARTED = {
 }
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 @pytest.mark.parametrize("kind", STARTED)
 def test_a_limit_below_the_input_at_time_0_is_refuted_and_one_above_it_is_not(kind: str):
     import casadi as ca
@@ -499,7 +500,7 @@ def test_just_above_the_least_decay_the_input_is_told_not_to_be_certified_bounde
     assert "decay=4 bounds it" in certificate.assessment.text
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("agents", "why", "mend"),
     [
@@ -534,6 +535,7 @@ def test_a_bound_that_is_larger_than_the_way_of_the_agents_says_little_by_t():
     assert assessment.useful is False and "a larger decay, such as 8, leaves less" in assessment.text
 
 
+@pytest.mark.few(0)
 def test_the_coupling_is_not_that_of_a_fast_function_with_a_huge_overshoot_constant():
     edges = [
         ("1", "2", "0.8"),
@@ -585,6 +587,7 @@ def test_one_agent_and_single_leaders_and_disconnected_graphs():
 DECADES = SignedDigraph.from_edges([("a", "b", "1e-30"), ("b", "a", "1e30"), ("b", "c", "-1e40"), ("c", "a", 1)])
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("graph", "agents", "answer", "claim"),
     [

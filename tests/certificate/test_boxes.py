@@ -134,19 +134,19 @@ def mutants(boxes: Any) -> list[tuple[tuple[Any, ...], Any]]:
     return found
 
 
-@pytest.mark.parametrize("first", thinned(range(7), 7))
+@pytest.mark.parametrize("first", thinned(range(14), 14))
 def test_no_mutant_of_a_box_is_accepted_that_is_false(first: int):
-    """Every seventh of them, from the first on."""
+    """Every fourteenth of them, from the first on."""
     data = {**moved().to_dict(), "unverified": {}}
     accepted = rejected = 0
-    for path, new in mutants(data["boxes"])[first::7]:
+    for path, new in mutants(data["boxes"])[first::14]:
         mutant = resealed(changed(data, ("boxes", *path), new))
         if check(mutant, stdlib=True).accepted:
             accepted += 1
             assert false_family_claims(mutant) == [], (path, new)
         else:
             rejected += 1
-    assert accepted >= 1 and rejected >= 5
+    assert accepted >= 1 and rejected >= 3
 
 
 @pytest.mark.parametrize(

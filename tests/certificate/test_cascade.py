@@ -145,7 +145,7 @@ def ratios_where_enclosed(part: CascadePart, sizes: np.ndarray) -> np.ndarray:
         return np.where(sizes > 0, sizes / part.deviation_bound(HALVINGS), 0)
 
 
-@pytest.mark.few(6)
+@pytest.mark.few(3)
 @pytest.mark.parametrize("seed", range(160))
 def test_bounds_are_above_where_agents_are_enclosed_by_no_integrator(seed: int):
     """From the beginning, from the third instant and from every one; what is near to its bound shows that it is."""
@@ -173,7 +173,7 @@ def with_larger_alpha(part: CascadePart) -> CascadePart:
     )
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("change", [with_smaller_roots, with_faster_functions, with_larger_alpha])
 def test_false_bounds_are_below_where_agents_are_enclosed_and_below_a_run(change: Any):
     """Also below one that is judged above :data:`~ptcc_certify.bounds.agents.run_against_bounds.RESOLVED`."""
@@ -319,6 +319,7 @@ def test_an_input_at_both_limits_is_not_claimed_to_be_bounded():
         holds(certificate)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("rho2", "alpha", "names"),
     [

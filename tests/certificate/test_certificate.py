@@ -214,6 +214,7 @@ def leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
         yield path, value
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(("name", "kwargs"), class_cases(KINDS[::6]))
 def test_numbers_are_exact_texts(name: str, kwargs: dict):
     data = of_class(name)
@@ -286,7 +287,7 @@ def test_a_broken_certificate_is_refused(how: str, tmp_path: Path):
 # ---------------------------------------------------------------------- the proof, anew
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(2)
 @pytest.mark.parametrize(("name", "kwargs"), class_cases((*ROWS, "disconnected 1.1 and isolated")))
 def test_the_json_alone_proves_the_claim(name: str, kwargs: dict):
     judge = Recheck(of_class(name))
@@ -330,6 +331,7 @@ def refused(data: dict[str, Any]) -> bool:
     return not true or not stands(Recheck(data))
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("name", "kwargs"), class_cases(("3.1 mixed no single",), ROWS))
 def test_the_recheck_sees_what_is_wrong(name: str, kwargs: dict):
     """A judge that accepts everything would prove nothing."""
@@ -373,6 +375,7 @@ def written_anew(data: dict[str, Any], old: str, new: Fraction) -> dict[str, Any
     return json.loads(text.replace(f'"{old}"', f'"{new}"'))
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("name", "kwargs"), class_cases(("1.1",), ROWS))
 def test_the_recheck_sees_what_is_wrong_with_a_searched_function(name: str, kwargs: dict):
     data = of_class(name)
@@ -407,6 +410,7 @@ def test_the_recheck_sees_what_is_wrong_with_a_searched_function(name: str, kwar
         assert spoilt(copy)
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", thinned(ROWS, 7))
 def test_the_recheck_sees_what_is_wrong_with_the_limit_of_rates(name: str):
     """A limit below the slowest mode, an earlier claim about its witness, a witness of less or of something else."""
@@ -494,6 +498,7 @@ REAL = {
 }
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=pytest.mark.campaign if name in REAL_CAMPAIGN else ()) for name in REAL]
 )
@@ -637,6 +642,7 @@ def ring(n: int, last: int) -> SignedDigraph:
     return SignedDigraph.from_edges([(i, (i + 1) % n, last if i == n - 1 else 1) for i in range(n)])
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("n", "last", "searched"), thinned([(121, 1, True), (121, -1, True), (SEARCH_NODES + 1, 1, False)], 2)
 )

@@ -72,6 +72,7 @@ def test_on_a_hundred_families_a_hundred_signals_each_exceed_nothing(part):
     assert runs >= 1000
 
 
+@pytest.mark.few(0)
 def test_a_certificate_that_claims_too_much_is_found_out():
     family = Family.from_intervals([("a", "b", "0.8", "1.2"), ("b", "a", "-1.2", "-0.8")])
     certificate = certify_family(family, PROTOCOL, [1, 2])

@@ -91,6 +91,7 @@ def of_led(sigma0):
     return certify_family(LED, PROTOCOL, [3, 1, 2], sigma0=sigma0, time_limit=60)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("sigma0", [(0, 0, 0), (1, -2, 3)])
 def test_inputs_are_below_their_curve(sigma0):
     certificate = of_led(sigma0)

@@ -49,7 +49,7 @@ def part_of(certificate: Certificate) -> AgentsPart:
     return certificate.agents
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", KINDS)
 def test_phases_are_accepted_read_back_and_leave_less(name: str):
     certificate = made(name)

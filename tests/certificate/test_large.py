@@ -58,6 +58,7 @@ def made(name: str, seed: int = 3) -> tuple[Certificate, Json]:
     return found, json.loads(found.to_json())
 
 
+@pytest.mark.few(4)
 @pytest.mark.usefixtures("small_is_large")
 @pytest.mark.parametrize(("name", "kwargs"), class_cases(KINDS[1::4]))
 def test_every_class_is_certified_as_a_large_graph(name: str, kwargs: dict):
@@ -87,6 +88,7 @@ def rejected(data: Json, where: str) -> None:
     assert (report.rejected or "").startswith(where), (report.rejected, report.reason)
 
 
+@pytest.mark.few(2)
 @pytest.mark.usefixtures("small_is_large")
 @pytest.mark.parametrize("name", ["2.1 K>=2", "2.2", "3.1 mixed", "3.2", "3.1 all single"])
 def test_false_rates_and_narrow_intervals_are_rejected(name: str):
@@ -419,6 +421,7 @@ SLOW = {
 IN_CAMPAIGNS = ("path", "ring", "ladder", "huge weights", "tiny weights")
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     "name",
     [pytest.param(name, marks=pytest.mark.campaign if name in IN_CAMPAIGNS else ()) for name in SLOW],
@@ -439,6 +442,7 @@ def test_undirected_groups_that_mix_slowly_are_certified(name: str):
     assert cert.final_state is not None and list(cert.final_state.states) == [g * mean for g in camps]
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     "start", [[0] * 130, [(-1) ** i for i in range(130)], [0] * 129 + ["1e-320"]], ids=["zero", "degenerate", "tiny"]
 )
@@ -524,6 +528,7 @@ def test_the_vector_of_ones_belongs_to_connected_graphs_of_equal_flows_only():
         left_vector(undirected([(i, i + 1, 1) for i in range(0, 600, 2)]))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("method", ["perron", "best"])
 @pytest.mark.parametrize("weight", thinned([1.7e308, 1e306], 2))
 def test_weights_near_the_largest_float_are_undecided(weight: float, method: str):

@@ -79,7 +79,7 @@ def test_agents_that_begin_at_a_final_state_that_is_too_long_to_be_written(how: 
     assert made.checked.accepted, made.checked.reason
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("decades", "seed"), [(1, 0), (2, 4), (2, 8), (2.5, 3), (3, 6)])
 def test_followers_of_ill_conditioned_equations_are_as_wide_as_is_proved(decades: float, seed: int):
     """A chain of 130 followers between two leaders; its weights are spread over twice so many decades."""
@@ -139,7 +139,7 @@ COMMANDS = {
 }
 
 
-@pytest.mark.few(9)
+@pytest.mark.few(3)
 @pytest.mark.parametrize("options", COMMANDS.values(), ids=COMMANDS)
 @pytest.mark.parametrize("long", [False, True], ids=["short", "long"])
 def test_where_the_check_rejects_nothing_is_claimed_refuted_or_written(options: list[str], long: bool, rejecting: Path):
@@ -155,7 +155,7 @@ def test_where_the_check_rejects_nothing_is_claimed_refuted_or_written(options: 
         assert word not in text
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 @pytest.mark.parametrize("options", COMMANDS.values(), ids=COMMANDS)
 def test_where_the_check_rejects_json_tells_that_alone(options: list[str], rejecting: Path):
     run = ptcc("certify", *options, "--no-simulation", "--json", "-o", "c.json")

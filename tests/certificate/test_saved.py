@@ -90,6 +90,7 @@ def agree(saved: Certificate, made: ptcc.Certificate) -> None:
         ]
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", thinned(sorted(CLASSES)))
 def test_a_certificate_comes_back_as_it_was(name: str, tmp_path: Path):
     made = certified(name)
@@ -186,7 +187,7 @@ def float_ball(x: Fraction) -> flint.arb:
 LITTLE = ptcc.Asks(expectations=Expectations(max_residual=Fraction(1, 1000)))
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("options", "says"),
     [
@@ -258,6 +259,7 @@ def test_a_run_repeated_from_the_file_keeps_the_bounds(number: int, tmp_path: Pa
     assert np.array_equal(saved.trajectory.states, made.trajectory.states)
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("said", [None, "worst-case", "telegraph", "none", "no such", "9*sin(t)", "__import__('os')"])
 def test_a_disturbance_that_is_no_expression_within_delta_gives_way_to_the_worst_case(said: str | None, tmp_path: Path):
     pair = ptcc.SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])

@@ -60,7 +60,7 @@ def sliding_run(certificate: Certificate) -> Trajectory:
 # ---------------------------------------------------------------------- the paper's examples
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 @pytest.mark.parametrize(("number", "name"), RUNS)
 def test_the_examples_behave_as_the_paper_reports(number: str, name: str):
     cert, run = example(number, name), sliding_run(example(number, name))
@@ -393,7 +393,7 @@ POWERS = (Fraction(1, 3), Fraction(1), Fraction(9, 5))
 OF_EACH_ROW = ("1.1", "1.2", "2.1 K=1", "2.1 K>=2", "2.2", "3.1 mixed", "3.1 mixed no single", "3.2")
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(2)
 @pytest.mark.parametrize(("name", "kwargs"), class_cases((*OF_EACH_ROW[1::2], "disconnected 1.2 2.1 isolated")))
 def test_every_row_keeps_its_bounds(name: str, kwargs: dict):
     number = [known for known, _ in all_classes()].index(name)
@@ -439,6 +439,7 @@ def path_protocol(**other: Any) -> SlidingModeProtocol:
     return SlidingModeProtocol(**(given | other))
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("mu1", ["1.001", "1.1", 2])
 @pytest.mark.parametrize("seed", thinned(range(4)))
 def test_a_function_that_is_the_worst_case_is_not_taken_for_a_violation(mu1: Any, seed: int):

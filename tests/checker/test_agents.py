@@ -425,6 +425,7 @@ def test_a_forged_certificate_is_rejected_for_its_reason(name: str):
     rejected(change(made(setting)), where, reason)
 
 
+@pytest.mark.few(0)
 def test_a_wrong_one_stays_wrong_in_the_eyes_of_the_oracle():
     """The oracle is no rubber stamp: what the check rejects as false is false to it."""
     false = dict[str, list[str]]()

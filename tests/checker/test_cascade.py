@@ -285,6 +285,7 @@ def test_a_forged_certificate_is_rejected_for_its_reason(name: str):
     rejected(change(made(setting)), where, reason)
 
 
+@pytest.mark.few(0)
 def test_what_is_rejected_as_false_is_false_to_the_oracle():
     false = {}
     for name in ("a smaller drive", "a smaller initial value", "another final position", "another motion"):

@@ -107,6 +107,7 @@ def every_class(sliding_first: bool) -> list[Any]:
     return [pytest.param(*case, marks=() if case in now else pytest.mark.campaign) for case in both]
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(("name", "slides"), every_class(False))
 def test_every_class_is_accepted_by_both_arithmetics(name: str, slides: bool):
     data = made(name, 3 + slides, slides)
@@ -514,7 +515,7 @@ def test_a_rate_above_the_spectral_rate(name: str):
         rejected(forged, rf"rate of lyapunov\.functions\[{k}\]")
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", ["1.1", "1.2", "2.1 K>=2", "2.2", "3.1 mixed", "3.2"])
 def test_a_limit_below_the_spectral_rate(name: str):
     """Nor is a limit accepted that some eigenvalue contradicts."""
@@ -653,6 +654,7 @@ def test_one_end_of_rho_without_the_other_is_rejected():
         rejected(changed(forged, ("proof", step, "numbers"), left), "rho-interval of paper")
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("gains", "size"),
     thinned(
@@ -721,6 +723,7 @@ def side_vectors(value: Any, path: tuple[str | int, ...] = ()) -> list[tuple[str
     return [found for key, item in items for found in side_vectors(item, (*path, key))]
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(("name", "slides"), every_class(True))
 def test_every_class_is_accepted_with_vectors_beside_it(name: str, slides: bool):
     """In the large form, by lists and by arrays; with the arrays alone too."""
@@ -832,6 +835,7 @@ def test_no_mutant_of_a_certificate_with_side_files_is_accepted(name: str, slide
 # ---------------------------------------------------------------------- factors of leader groups
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("aside", [False, True])
 @pytest.mark.parametrize("name", thinned(["1.1", "1.2", "2.2", "2.1 K>=2", "3.1 mixed", "3.2", "3.1 no single"], 2))
 def test_groups_are_proved_by_factors(name: str, aside: bool):
@@ -1052,6 +1056,7 @@ def test_few_long_entries_of_a_large_matrix_are_refused_before_it_is_formed():
     tracemalloc.stop()
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("piece", thinned(["[]", '"a"', "{}", '{"a":1}', "257", "[[1.5]]"], 3))
 def test_json_that_would_fill_the_memory_is_refused_before_it_is_parsed(piece: str, tmp_path: Path):
     path = tmp_path / "c.json"

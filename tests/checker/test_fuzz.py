@@ -96,6 +96,7 @@ def with_limits() -> Json:
     return data
 
 
+@pytest.mark.few(5)
 @pytest.mark.parametrize(
     ("path", "share"),
     [

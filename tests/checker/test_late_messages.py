@@ -158,7 +158,7 @@ def test_motions_keep_to_what_is_accepted(name: str):
     assert late_claims(samples()[name]) == []
 
 
-@pytest.mark.few(5)
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("name", "path", "factor", "claim"),
     [
@@ -183,6 +183,7 @@ def test_the_oracle_finds_what_is_false(name: str, path: tuple[Any, ...], factor
     assert any(claim in told for told in false), false
 
 
+@pytest.mark.few(0)
 def test_the_oracle_finds_leaders_that_do_not_settle_so_fast_and_rows_that_do_not_hold():
     data, told = settling(1), step(settling(1), "messages.settling")
     u = data["proof"][told[1]]["witness"]["u"]

@@ -11,6 +11,8 @@ import pytest
 from bad_inputs import ptcc
 from selection import thinned
 
+pytestmark = pytest.mark.usefixtures("quick_search")
+
 FILES = {
     "chain.csv": "ann,bob,1\nbob,eve,-1\n",
     "foes.csv": "ann,bob,-1\nbob,ann,-1\n",
@@ -361,7 +363,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         Path(name).write_text(text)
 
 
-@pytest.mark.few(15)
+@pytest.mark.few(8)
 @pytest.mark.parametrize("line", thinned(COMMANDS, 8))
 def test_what_is_advised_is_not_refused(line: str) -> None:
     command = tuple(line.split())

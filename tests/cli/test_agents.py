@@ -73,6 +73,7 @@ def test_single_integrators_in_places_under_a_gain_cap_have_the_bounds_of_the_pl
     assert ptcc(*drawn, "-o", str(tmp_path / "m.png")).code == 0
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize(
     "limits",
     [

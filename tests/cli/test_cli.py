@@ -32,6 +32,8 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import write_graph
 from ptcc_certify.graphs.structure import BEHAVIOURS, analyse
 
+pytestmark = pytest.mark.usefixtures("quick_search")
+
 X0 = "5,2,-4,3,-2,1"
 PAPER = ("--method", "paper", "--no-simulation")
 
@@ -198,6 +200,7 @@ def test_an_error_of_the_program_is_not_taken_for_a_violated_bound(monkeypatch: 
         assert (run.code, run.out, len(run.err.strip().splitlines())) == (code, "", 1)
 
 
+@pytest.mark.usefixtures("every_class")
 @pytest.mark.parametrize("method", thinned(["paper", "perron", "lmi", "full", "best"], 2))
 def test_the_method_decides_which_classes_are_searched(method: str):
     data = one_object(ptcc("certify", "fig3a", "--method", method, "--x0", X0, "--json").out)
@@ -842,6 +845,7 @@ def test_max_input_under_a_limit_is_about_what_the_limit_leaves(folder: Path):
     assert ptcc(*words, "--gain-cap", "1", "--sample-period", "0.01", "--max-input", "3").code == 4
 
 
+@pytest.mark.usefixtures("every_class")
 def test_an_input_without_bound_is_said_prominently_and_refutes_every_limit():
     words = ("certify", "fig5b", "--T", "0.6", "--rho1", "0.1", "--rho2", "0.3", "--kappa", "1", "--no-simulation")
     assert "INPUT      NOT BOUNDED" in ptcc(*words).out
@@ -864,6 +868,7 @@ def test_limits_of_actuators_are_judged_and_simulated(folder: Path):
     assert rows[0].startswith("t,remaining,1,2,3,4,5,6,u(1),")
 
 
+@pytest.mark.usefixtures("every_class")
 def test_design_answers_with_gains_a_refutation_or_neither(folder: Path):
     asked = ("design", "fig1a", "--max-input", "10", "--initial-bound", "1")
     met = ptcc(*asked, "--deadline", "2", "-o", "d.json", "--curve", "d.csv")

@@ -17,6 +17,8 @@ from side_files import with_side_files
 import ptcc_certify
 from ptcc_certify.cli import cli
 
+pytestmark = pytest.mark.usefixtures("quick_search")
+
 TEAM = "ann,bob,1\nbob,ann,1\nbob,eve,-2\neve,dan,1\ndan,eve,1\n"
 
 
@@ -221,7 +223,7 @@ def test_a_report_is_written_of_a_certificate_from_standard_input(certificate: s
         assert ptcc("report", "-", "-o", name, "--no-simulation", stdin=content).code == 0
         assert Path(name).read_text(encoding="utf-8") == expected
     spaced = json.dumps(json.loads(content), indent=3).encode()  # another file, of the same content
-    run = process("-m", "ptcc_certify", "report", "-", "-o", "d.html", "--no-simulation", stdin=spaced)
+    run = ptcc("report", "-", "-o", "d.html", "--no-simulation", stdin=spaced)
     assert run.code == 0 and hashlib.sha256(spaced).hexdigest() in Path("d.html").read_text(encoding="utf-8")
     for wrong in (b"", b"a,b,1", b"{}"):
         run = ptcc("report", "-", "-o", "e.html", stdin=wrong)
@@ -327,7 +329,7 @@ def test_click_completes_commands_options_and_values_without_anything_that_compu
     ],
 )
 def test_a_word_of_another_place_is_refused_with_its_place(words: tuple[str, ...], says: str):
-    run = process("-m", "ptcc_certify", *words)
+    run = ptcc(*words)
     assert run.code == 2 and says in run.err and run.err.count("\n") == 1, run
 
 

@@ -20,6 +20,8 @@ from ptcc_certify.graphs.declared_option import option, options_of
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.parameters import Given
 
+pytestmark = pytest.mark.usefixtures("quick_search")
+
 PARAMETERS = {name: {p.name: p for p in command.params} for name, command in cli.commands.items()}
 
 

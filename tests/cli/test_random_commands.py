@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 from random_commands import KINDS, random_command, run_case
 
+pytestmark = pytest.mark.usefixtures("quick_search")
+
 #: Seeds of each kind by default, and in campaigns.
 FEW, MANY = 1, 40
 CASES = [
@@ -16,7 +18,7 @@ CASES = [
 ]
 
 
-@pytest.mark.few(6)
+@pytest.mark.few(3)
 @pytest.mark.parametrize(("kind", "seed"), CASES)
 def test_what_is_written_is_accepted_and_nothing_goes_wrong(
     kind: str, seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -18,6 +18,8 @@ from ptcc_certify.cli.scenario import MAX_BYTES, SECTIONS, read_scenario
 from ptcc_certify.errors import PTCCError
 from ptcc_certify.report.page_figures import PLOTS
 
+pytestmark = pytest.mark.usefixtures("quick_search")
+
 TEAM = "ann,bob,1\nbob,ann,1\nbob,eve,-2\neve,dan,1\ndan,eve,1\n"
 SCENARIO = """
 [graph]

@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from bad_inputs import ptcc
 
+pytestmark = pytest.mark.usefixtures("quick_search")
+
 FAMILY = ("simulate", "day.csv", "night.csv", "--switching", "--x0", "1,2,3")
 
 

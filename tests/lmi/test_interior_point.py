@@ -89,7 +89,7 @@ def test_the_dual_matrix_bounds_every_margin(seed, n):
         assert lmi.diagonal_margin(A, rng.random(n)) <= found.value + 1e-9
 
 
-def test_closed_forms():
+def test_quick_search():
     rng = np.random.default_rng(0)
     B = rng.normal(size=(30, 30))
     S = B @ B.T + np.eye(30)  # symmetric: no diagonal does better than the identity

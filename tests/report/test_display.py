@@ -24,6 +24,8 @@ from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.simulation.run import simulate
 
+pytestmark = pytest.mark.usefixtures("quick_search")
+
 PROTOCOL = NominalProtocol(T=2, rho1=1, rho2=1, kappa=2)
 SLIDING = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
 
@@ -115,6 +117,7 @@ def test_what_cannot_be_drawn_is_told_in_words() -> None:
     assert "1 node, 0 edges" in shown(certify(still, PROTOCOL, [3])).text
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     "label", thinned(['"><img src=x onerror=alert(1)>', "<script>alert(1)</script>", "$x$", "&lt;b&gt;"], 2)
 )

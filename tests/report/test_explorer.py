@@ -31,6 +31,8 @@ from ptcc_certify.report.explorer import GIVEN, Explorer, Settings, View, explor
 from ptcc_certify.report.explorer.question import reading_of
 from ptcc_certify.report.explorer.widgets import controls
 
+pytestmark = pytest.mark.usefixtures("quick_search")
+
 PNG = b"\x89PNG\r\n\x1a\n"
 SLIDING = Settings(kind="sliding-mode")
 
@@ -154,6 +156,7 @@ def test_every_packaged_graph_is_there(explorer: Explorer, panel: Panel):
         assert view.verdict.startswith("certified"), name
 
 
+@pytest.mark.usefixtures("every_class")
 def test_a_class_of_bounds_shows_its_own_rate(explorer: Explorer):
     rates = {}
     for method in ("paper", "perron", "lmi", "full", "best"):

@@ -26,6 +26,8 @@ from ptcc_certify.examples import GRAPHS
 from ptcc_certify.report.explorer import Explorer, Settings
 from ptcc_certify.report.explorer.server import ExplorerServer, Superseded, open_server
 
+pytestmark = pytest.mark.usefixtures("quick_search")
+
 FEW = Settings("fig1a", method="paper")
 
 
@@ -283,17 +285,16 @@ main()
 """
 
 
+@pytest.mark.few(2)
 @pytest.mark.skipif(os.name == "nt", reason="signals are sent otherwise there")
-def test_ctrl_c_ends_the_explorer_well_while_native_code_draws():
+@pytest.mark.parametrize("again", range(4))
+def test_ctrl_c_ends_the_explorer_well_while_native_code_draws(again: int):
     """Without care two of three of these processes are aborted."""
-    for _ in range(4):
-        process = subprocess.Popen(
-            [sys.executable, "-c", BUSY], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
-        assert process.stdout is not None and any(line == "busy\n" for line in process.stdout)
-        process.send_signal(signal.SIGINT)
-        _, told = process.communicate(timeout=60)
-        assert process.returncode == 0 and told.endswith("the explorer has ended\n"), told
+    process = subprocess.Popen([sys.executable, "-c", BUSY], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None and any(line == "busy\n" for line in process.stdout)
+    process.send_signal(signal.SIGINT)
+    _, told = process.communicate(timeout=60)
+    assert process.returncode == 0 and told.endswith("the explorer has ended\n"), told
 
 
 # ---------------------------------------------------------------------- in a browser

@@ -22,7 +22,7 @@ from ptcc_certify.report.facts.law import beside_law
 from ptcc_certify.report.page import set_note
 from ptcc_certify.report.screen import certificate_lines, summary_lines
 
-pytestmark = pytest.mark.usefixtures("framed_figures")
+pytestmark = pytest.mark.usefixtures("framed_figures", "quick_search")
 
 CORPUS = Path(__file__).parents[1] / "corpus"
 NAMES = thinned(sorted(path.stem for path in CORPUS.glob("*.json")), 24)
@@ -166,6 +166,7 @@ def test_bounds_of_the_law_without_what_was_asked_say_so_on_every_screen():
     assert any("without limits or noise: at t = 0.7: " in line for line in summary_lines(both))
 
 
+@pytest.mark.usefixtures("every_class")
 def test_agents_that_begin_at_their_ends_stay_there_but_for_noise():
     cap, ends = ptcc.GainLimits(gain_cap=20), ["0.3", "0.3", "-0.3"]
     assert told(asked(ends, limits=cap), "error")[0] == "without limits: none: every agent begins at its final state"

@@ -38,6 +38,8 @@ from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.switching_signals import RandomSignal
 from ptcc_certify.theorems.family_behaviour import decide
 
+pytestmark = pytest.mark.usefixtures("quick_search")
+
 
 @pytest.fixture(autouse=True)
 def words_alone(request: pytest.FixtureRequest) -> None:
@@ -232,6 +234,7 @@ def test_under_a_dwell_time_the_page_shows_signals_that_keep_it(clock: str):
         assert drawn.get_legend().get_title().get_text() == "8 signals of the kind asked for"
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("signal", ["constant", ClockShares(["0.75", "0.25"]), JointWindows(2, on="0.5", clock="s")])
 def test_the_runs_of_a_family_are_under_signals_of_the_kind_that_was_asked(signal: Any) -> None:
     chains = [[("ann", "<b>", 9), ("<b>", "eve", -9)], [("ann", "<b>", 9), ("<b>", "eve", -18), ("ann", "eve", -9)]]

@@ -20,6 +20,8 @@ from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.switching_signals import RandomSignal, WorstCaseSignal
 from ptcc_certify.theorems.family_behaviour import decide
 
+pytestmark = pytest.mark.usefixtures("quick_search")
+
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
 DAY = Family.from_graph(SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1), ("c", "a", -2)]), uncertainty="20%")
 NIGHT = SignedDigraph.from_edges([("c", "a", -2), ("a", "b", 1)])

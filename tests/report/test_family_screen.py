@@ -28,7 +28,7 @@ from ptcc_certify.report.screen import certificate_lines, long_screen, short_scr
 from ptcc_certify.theorems.counterexample_text import counterexample_text
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
 
-pytestmark = pytest.mark.usefixtures("framed_figures")
+pytestmark = pytest.mark.usefixtures("framed_figures", "quick_search")
 
 PROTOCOL = ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
 LONG = "agent number {} of a rather long list of agents"
@@ -49,6 +49,7 @@ def assert_fits(lines: list[str], most: int) -> None:
         assert cell_len(line) <= 80 and line.isprintable() and line == line.rstrip(), line
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_decision_of_any_family_fits_the_screen(kind: str):
     rng = random.Random(KINDS.index(kind))
@@ -65,7 +66,7 @@ def test_the_decision_of_any_family_fits_the_screen(kind: str):
             assert len(components) > 1 or sum(line.startswith("claim") for line in told) == 1
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_certificate_of_any_family_fits_the_screen(kind: str):
     rng = random.Random(10 + KINDS.index(kind))

@@ -62,9 +62,10 @@ from ptcc_certify.simulation.nominal import Bounded
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
 
-pytestmark = pytest.mark.filterwarnings(
-    "error", "ignore::DeprecationWarning:matplotlib|pyparsing", "ignore:Glyph .* missing"
-)
+pytestmark = [
+    pytest.mark.filterwarnings("error", "ignore::DeprecationWarning:matplotlib|pyparsing", "ignore:Glyph .* missing"),
+    pytest.mark.usefixtures("quick_search"),
+]
 
 STYLE_FILE = Path(ptcc_certify.__file__).with_name("ptcc.mplstyle")
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
@@ -151,6 +152,7 @@ def peak_of(ax: Axes) -> Annotation | None:
     return next((text for text in ax.texts if text.get_text().startswith("certified peak")), None)  # type: ignore[return-value]
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", ["fig1a", "fig3b", "apart", "single"])
 def test_each_of_few_agents_has_a_line_of_its_camp_and_its_name(name: str) -> None:
     cert = certified(name)
@@ -191,6 +193,7 @@ def test_of_many_agents_the_parts_are_drawn_and_few_agents_named() -> None:
         assert len(agent_lines(ax)) <= 2 * len(set(group)) and 2 <= len(ax.texts) <= 9
 
 
+@pytest.mark.usefixtures("every_class")
 def test_the_peak_is_drawn_where_it_holds_only() -> None:
     graph, start = graph_of("fig3b"), [-4, 3, -1, 2, -2, 5]
     protocol, capped = EXAMPLES[2].protocol(), GainLimits(gain_cap="0.5")
@@ -217,6 +220,7 @@ def test_the_peak_is_drawn_where_it_holds_only() -> None:
         assert steps == {"steps-post" if run.held_input is not None else "default"}
 
 
+@pytest.mark.usefixtures("every_class")
 @pytest.mark.parametrize("radius", [5, 1])
 def test_beside_the_peak_of_a_set_the_set_is_named(radius: int) -> None:
     graph, start = graph_of("fig3b"), [-4, 3, -1, 2, -2, 5]
@@ -562,6 +566,7 @@ ASKED: dict[str, dict[str, Any]] = {
 }
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("title", ASKED)
 def test_the_run_that_is_drawn_is_the_one_that_was_asked(title: str) -> None:
     graph = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1), (1, 4, 1), (3, 4, -1)])

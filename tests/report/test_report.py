@@ -61,6 +61,8 @@ from ptcc_certify.report.report_file import write_report
 from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.report.statement import report_latex
 
+pytestmark = pytest.mark.usefixtures("quick_search")
+
 #: What a page needs, and nothing that loads, runs or leaves it.
 TAGS = frozenset(
     re.findall(
@@ -704,6 +706,7 @@ def shares_of(text: str) -> dict[float, float]:
     return {float(f): float(share) * 10 ** int(power or 0) for share, power, f in pairs}
 
 
+@pytest.mark.usefixtures("every_class")
 def test_a_statement_holds_hypotheses_claim_and_numbers(tmp_path: Path):
     made = example("limits")
     made.save(tmp_path / "c.json")

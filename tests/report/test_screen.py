@@ -32,6 +32,8 @@ from ptcc_certify.report.page import report_html
 from ptcc_certify.report.screen import certificate_lines, check_summary, short_screen, summary_lines
 from ptcc_certify.report.text_layout import columns, shorten_list, wrap_lines
 
+pytestmark = pytest.mark.usefixtures("quick_search")
+
 NOMINAL = ptcc.NominalProtocol(T="0.6", rho1="0.1", rho2="0.6", kappa=1)
 STRONG = ptcc.NominalProtocol(T=1, rho1=1, rho2=2, kappa=2)
 SLIDING = ptcc.SlidingModeProtocol(T_r="0.5", T_s=1, rho1="0.1", rho2="0.3", kappa=2, mu1="1.2", mu2=1, mu3=1, delta=1)

@@ -158,6 +158,7 @@ def test_other_shares_or_an_edge_between_other_rows_are_refuted_at_any_size(n, c
     assert replay(component, component.counterexample)
 
 
+@pytest.mark.few(0)
 def test_a_false_enclosure_does_not_replay():
     component = decide(chain_of_followers(200, Fraction(1, 10)))[0]
     q = component.counterexample.enclosure
