@@ -22,7 +22,7 @@ from ptcc_certify.bounds.final_state.of_graph import FinalState, Influence, infl
 from ptcc_certify.bounds.input.effort import Effort
 from ptcc_certify.bounds.input.effort_bounds import InputRequest, bound_effort, full_constants
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
-from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
+from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.proof import Proof
 from ptcc_certify.checker import INPUT_NODES
@@ -268,11 +268,9 @@ class GraphProof(Proof):
     @cached_property
     def envelope(self) -> Envelope:
         """The proved bounds over time; without Lyapunov functions if nothing was proved."""
-        gain = self.protocol.gain
-        if (sliding := self.protocol.reaching) is not None:
-            sigma0, reaching = self.sigma0 or (), self.reaching or ()
-            return SlidingEnvelope(self.structure, gain, self.functions, sliding, sigma0, reaching)
-        return Envelope(self.structure, gain, self.functions)
+        sliding = self.protocol.reaching
+        phase = None if sliding is None else ReachingPhase(sliding, self.reaching or (), self.sigma0 or ())
+        return Envelope(self.structure, self.protocol.gain, self.functions, phase)
 
     @gated
     def norm_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:

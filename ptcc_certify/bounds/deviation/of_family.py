@@ -1,24 +1,38 @@
-"""How far the agents of a family are from where they end, and how fast they go, for every signal; in floats, upwards.
+"""How far agents of a component are from where they end, and how fast they go, for every signal; in floats, upwards.
+
+With ``sqrt(V) <= y``, ``|(L y)_k| <= c_k sqrt(V)``, sliding variables that move by ``|sigma_k| <= psi |sigma_k(0)|``,
+``R(t) = int_t^T gain psi`` and a rate ``2 alpha``,
+
+    |x_k(t) - x_k(T)|  <=  c_k (y(t) + c R(t)) / alpha + m_k R(t) + |sigma_k|,      |u_k|  <=  gain (c_k y + m_k psi)
+
+where ``c`` and ``m_k`` are those of :mod:`ptcc_certify.checker.family_sliding`: the first is what the speeds add up to
+until the deadline. Deviations are besides at most what :func:`from_rest` tells where ``R`` is 0, and at all times
+where all agents end at 0.
 
 References
 ----------
-docs/theory/families.md, "Where it ends" and "Disturbances".
+docs/theory/families.md, "Where it ends", "Disturbances" and "Inputs".
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from ptcc_certify.bounds.envelope import Instants
+from lmi.exact.decimal_rounding import float_down
+from ptcc_certify.bounds.decay import Decay
+from ptcc_certify.bounds.deviation.heard import HeardRows
+from ptcc_certify.bounds.instants import Instants
 from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.checker.family_bounds import Function as BoundsFunction
-from ptcc_certify.checker.family_bounds import deviations, least
+from ptcc_certify.checker.family_bounds import least
 from ptcc_certify.checker.family_function import Scaled
 from ptcc_certify.checker.family_sliding import Drive
+from ptcc_certify.checker.reading import Interval
 from ptcc_certify.graphs.rationals import nearest_float
 
 _SLACK = 1 + 1e-12
@@ -39,31 +53,6 @@ class RestStates(NamedTuple):
 
     rows: Mapping[int, Mapping[int, Fraction]]
     groups: Sequence[Sequence[int]]
-
-
-def deviation_on_clock(
-    V: Function, rest: RestStates | None, x: Sequence[Fraction], clock: np.ndarray
-) -> np.ndarray | None:
-    """Bound ``|x_k(t) - x_k(T)|`` by a function of a component, (n, M); None if it does not decay.
-
-    That is what the speeds add up to until the deadline, and at most what :func:`from_rest` tells.
-
-    Parameters
-    ----------
-    V : Function
-    rest : RestStates or None
-        Of the component, where they are known.
-    x : sequence of n Fraction
-        The initial state.
-    clock : (M,) array
-    """
-    moves, unit = deviations([V], x)
-    if not moves:
-        return None
-    if rest is not None:
-        vector, factor = from_rest(V.sizes, rest)
-        moves, unit = least([(moves, Fraction(1, unit)), (vector, factor * V.root(x))])
-    return _times([Fraction(moves[k], unit) for k in range(len(x))], _decay(V, clock))
 
 
 def from_rest(sizes: Sequence[Scaled], rest: RestStates) -> Scaled:
@@ -103,90 +92,130 @@ def from_rest(sizes: Sequence[Scaled], rest: RestStates) -> Scaled:
     return result, Fraction(1, scale << _ROUNDING_BITS)
 
 
-def input_on_clock(V: Function, x: Sequence[Fraction], clock: np.ndarray, gain: np.ndarray) -> np.ndarray:
-    """Bound ``gain |(L x)_k|`` by a function of a component, (n, M)."""
-    speeds, unit = least(V.speeds)
-    root = V.root(x) / unit
-    return _times([speeds[k] * root for k in range(len(x))], gain * _decay(V, clock))
+@dataclass(frozen=True, eq=False)
+class FunctionOf:
+    """A function of some agents of a component that hear nobody else, and their common states at rest."""
+
+    agents: np.ndarray
+    function: Function
+    rest: RestStates | None
 
 
-def _times(sizes: Sequence[Fraction], factors: np.ndarray) -> np.ndarray:
-    """Return products in floats; infinity for sizes beyond their range."""
-    size = np.array([above(x) for x in sizes])
-    with np.errstate(invalid="ignore"):
-        products = np.multiply.outer(size, factors)
-    products[np.isinf(size)] = np.inf
-    return products
+@dataclass(frozen=True, eq=False)
+class ComponentBounds:
+    """The bounds over time of a component.
 
-
-def _decay(V: Function, clock: np.ndarray) -> np.ndarray:
-    return np.exp(-float(V.rate) * (1 - 1e-12) / 2 * clock)
-
-
-def deviation_while_driven(
-    V: Function, rest: RestStates | None, y: Sequence[Fraction], drive: Drive, phase: ReachingPhase, at: Instants
-) -> np.ndarray | None:
-    """Bound the same where sliding variables move: of ``y = x - sigma`` by the integral of its speed, and ``|sigma|``.
-
-        |y_k(t) - x_k(T)|  <=  int_t^T gain |(L x)_k|  <=  c_k (v(t) + c R(t)) / alpha + m_k R(t)
-
-    ``R(t) = int_t^T gain psi``, with the rate ``2 alpha`` and ``|(L y)_k| <= c_k v``. Besides by :func:`from_rest`
-    where ``R`` is 0, and at all times where all agents end at 0.
-
-    Parameters
+    Attributes
     ----------
-    V : Function
-    rest : RestStates or None
-        Of the component, where they are known.
-    y : sequence of n Fraction
-        ``x(0) - sigma(0)``.
-    drive : Drive
-    phase : ReachingPhase
-    at : Instants
-        M of them.
+    functions : sequence of FunctionOf
+    x : sequence of n Fraction
+        ``x(0)``, less ``sigma(0)`` where sliding variables move.
+    rows : HeardRows, or None
+        Followed if ``ends`` are known, a function decays, and no sliding variable moves.
+    ends : sequence of n intervals, or None
+        Where every agent ends.
+    drive : Drive or None
+        What sliding variables do; None where none moves.
+    phase : ReachingPhase or None
+        When.
     """
-    if V.rate <= 0:
-        return None
-    half = float(V.rate) * (1 - 1e-12) / 2
-    nodes = range(len(y))
-    c = above(drive.constant(V))
-    with np.errstate(over="ignore", invalid="ignore"):
-        v, more = phase.driven(half, above(V.root(y)), c, at), phase.rest(at)
-        deviation = np.multiply.outer(_floats(V.speeds, len(y)), (v + c * more) / half)
-        deviation += np.multiply.outer([above(drive.sizes[k]) for k in nodes], more)
-        if rest is not None:
-            near = np.multiply.outer(_floats([from_rest(V.sizes, rest)], len(y)), v)
-            deviation = np.fmin(deviation, near if not rest.groups else np.where(more == 0, near, np.inf))
-        deviation += sliding_sizes(drive, phase, at)
-    return np.nan_to_num(deviation, nan=np.inf, posinf=np.inf)
+
+    functions: Sequence[FunctionOf]
+    x: Sequence[Fraction]
+    rows: HeardRows | None = None
+    ends: Sequence[Interval] | None = None
+    drive: Drive | None = None
+    phase: ReachingPhase | None = None
+
+    def deviation(self, at: Instants) -> np.ndarray:
+        """Bound ``|x_k(t) - x_k(T)|`` at M instants, (n, M): 0 where all begin where they end, at rest."""
+        still = len(self.x) == 1
+        if self.drive is not None:
+            bounds = np.zeros((1, at.clock.size)) if still else self.by_functions(at)
+            return bounds + self._sliding(at)
+        if self.ends is not None:
+            still = still or all(x == low == high for x, (low, high) in zip(self.x, self.ends, strict=True))
+        if still:
+            return np.zeros((len(self.x), at.clock.size))
+        bounds, finite = self.by_functions(at), np.isfinite(at.clock)
+        rate = max((float(one.function.rate) for one in self.functions), default=0.0)
+        if self.rows is not None and self.ends is not None and rate > 0 and finite.any():
+            start = np.array([above(max(abs(x - e) for e in ends)) for x, ends in zip(self.x, self.ends, strict=True)])
+            followed = self.rows.follow(start, lambda s: self.by_functions(Instants(s)), at.clock[finite], rate)
+            bounds[:, finite] = np.fmin(bounds[:, finite], followed)
+        return bounds
+
+    def by_functions(self, at: Instants) -> np.ndarray:
+        """Bound the same by functions alone, less what sliding variables are; infinite where none decays."""
+        bounds = np.full((len(self.x), at.clock.size), np.inf)
+        for one in self.functions:
+            if one.function.rate > 0:
+                bounds[one.agents] = np.minimum(bounds[one.agents], self._deviation(one, at))
+        return bounds
+
+    def _deviation(self, one: FunctionOf, at: Instants) -> np.ndarray:
+        """Bound the deviations of the agents of one function."""
+        V = one.function
+        decay, unit = self.decay(one)
+        n, rest = one.agents.size, None if one.rest is None else from_rest(V.sizes, one.rest)
+        if self.drive is None:
+            speeds = [(vector, factor * 2 / V.rate) for vector, factor in V.speeds]
+            return decay.times(_floats([*speeds, *([] if rest is None else [rest])], n, unit), at)
+        assert self.phase is not None
+        left = self.phase.rest(at)
+        with np.errstate(over="ignore", invalid="ignore"):
+            driven = decay.times(1.0, at) + above(self.drive.constant(V) / unit) * left
+            bounds = np.multiply.outer(_floats(V.speeds, n, unit * 2 / V.rate), driven)
+            bounds += np.multiply.outer([above(self.drive.sizes[k]) for k in range(n)], left)
+            if rest is not None and one.rest is not None:
+                near = decay.times(_floats([rest], n, unit), at)
+                bounds = np.fmin(bounds, near if not one.rest.groups else np.where(left == 0, near, np.inf))
+        return np.nan_to_num(bounds * _SLACK, nan=np.inf, posinf=np.inf)
+
+    def input(self, at: Instants, gain: np.ndarray) -> np.ndarray:
+        """Bound ``gain |(L x)_k|``, (n, M)."""
+        if len(self.x) == 1:
+            return np.zeros((1, at.clock.size))
+        bounds = np.full((len(self.x), at.clock.size), np.inf)
+        with np.errstate(over="ignore", invalid="ignore"):
+            for one in self.functions:
+                decay, unit = self.decay(one)
+                speeds = _floats(one.function.speeds, one.agents.size, unit)
+                own = decay.times(speeds, at) * gain
+                own[np.isinf(speeds)] = np.inf
+                if self.drive is not None and self.phase is not None:
+                    sizes = [above(self.drive.sizes[k]) for k in range(len(self.x))]
+                    own = (own + np.multiply.outer(sizes, gain * self.phase.share_at(at))) * _SLACK
+                bounds[one.agents] = np.fmin(bounds[one.agents], own)
+            if self.rows is not None and self.drive is None:
+                heard = self.rows.speeds(self.deviation(at)) * gain
+                bounds = np.where(np.isfinite(at.clock), np.fmin(bounds, heard), bounds)
+        return np.nan_to_num(bounds, nan=np.inf, posinf=np.inf)
+
+    def decay(self, one: FunctionOf) -> tuple[Decay, Fraction]:
+        """Return what bounds ``sqrt(V(x - sigma))`` over time, in a unit, and that."""
+        V = one.function
+        root = V.root([self.x[v] for v in one.agents.tolist()])
+        if self.drive is None:
+            return Decay(float_down(V.rate), 1.0 if root else 0.0), root
+        c = self.drive.constant(V)
+        unit = root or c or Fraction(1)
+        assert self.phase is not None
+        return Decay(float_down(V.rate), above(root / unit), self.phase, above(c / unit) * self.phase.shares), unit
+
+    def _sliding(self, at: Instants) -> np.ndarray:
+        """Bound ``|sigma_k|``, (n, M)."""
+        assert self.drive is not None and self.phase is not None
+        sizes = [abs(float(s)) for s in self.drive.sigma0.values()]
+        return np.multiply.outer(sizes, self.phase.share_at(at)) * _SLACK
 
 
-def input_while_driven(
-    V: Function, y: Sequence[Fraction], drive: Drive, phase: ReachingPhase, at: Instants, gain: np.ndarray
-) -> np.ndarray:
-    """Bound ``gain |(L x)_k| <= gain (c_k v + m_k psi)`` where sliding variables move."""
-    if V.rate <= 0:
-        return np.full((len(y), at.clock.size), np.inf)
-    half = float(V.rate) * (1 - 1e-12) / 2
-    with np.errstate(over="ignore", invalid="ignore"):
-        v = phase.driven(half, above(V.root(y)), above(drive.constant(V)), at)
-        own = np.multiply.outer(_floats(V.speeds, len(y)), gain * v)
-        own += np.multiply.outer([above(drive.sizes[k]) for k in range(len(y))], gain * phase.share_at(at))
-    return np.nan_to_num(own * _SLACK, nan=np.inf, posinf=np.inf)
-
-
-def _floats(bounds: Sequence[Scaled], n: int) -> np.ndarray:
-    """Return the least bound of every node in floats that are not below; infinity where there is none."""
-    values, unit = least(bounds)
-    return np.array([above(Fraction(values[k], unit)) if k in values else np.inf for k in range(n)])
+def _floats(bounds: Sequence[Scaled], n: int, unit: Fraction) -> np.ndarray:
+    """Return the least bound of every node times a unit in floats that are not below; infinity where there is none."""
+    values, scale = least(bounds)
+    return np.array([above(values[k] * unit / scale) if k in values else np.inf for k in range(n)])
 
 
 def above(x: Fraction) -> float:
     """Return a float that is not below; infinity beyond their range."""
     return nearest_float(x) * _SLACK
-
-
-def sliding_sizes(drive: Drive, phase: ReachingPhase, at: Instants) -> np.ndarray:
-    """Bound ``|sigma_k|``, (n, M)."""
-    sizes = [abs(float(s)) for s in drive.sigma0.values()]
-    return np.multiply.outer(sizes, phase.share_at(at)) * _SLACK
