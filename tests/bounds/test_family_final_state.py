@@ -21,13 +21,10 @@ from scipy.linalg import expm
 
 import ptcc_certify.bounds.final_state.of_family as module
 from ptcc_certify.bounds.final_state.attracting_box import attracting_box, invariant_intervals
-from ptcc_certify.bounds.final_state.of_family import final_value, value_ends, weighted_mean_interval
+from ptcc_certify.bounds.final_state.of_family import final_value, value_ends
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.family_rows import follower_decay
-from ptcc_certify.lyapunov.family_search import search_family
-from ptcc_certify.lyapunov.quotient import Quotient
-from ptcc_certify.theorems.family_behaviour import decide
 
 # ---------------------------------------------------------------------- constant weights
 
@@ -98,41 +95,6 @@ def test_a_mode_without_consensus_has_no_final_value(edges):
     family = Family.from_intervals(edges)
     with pytest.raises(HypothesisError):
         final_value(family.modes[0], [Fraction(1)] * family.n_nodes)
-
-
-# ---------------------------------------------------------------------- every signal
-
-
-def test_weighted_means_enclose_the_values_of_random_signals():
-    rng, widths = random.Random(5), []
-    for _ in range(8):
-        family = random_consensus(rng)
-        (component,) = decide(family)
-        quotient = Quotient.of(component)
-        functions = search_family(quotient, kinds=("undirected", "diagonal")).functions if quotient.nodes else ()
-        if not functions or functions[0].rate <= 0:
-            continue
-        x = random_state(rng, family.n_nodes)
-        low, high = weighted_mean_interval(quotient, functions[0], component.gauge.tolist(), x)
-        X = np.array([float(v) for v in x])
-        for _ in range(60):
-            X = expm(-0.2 * laplacian(family.modes[0], random_vertex(rng, family.modes[0]))) @ X
-        step = expm(-laplacian(family.modes[0], random_vertex(rng, family.modes[0])))
-        X = np.linalg.matrix_power(step, 10_000) @ X  # old SciPy has no exponential of so large a matrix
-        assert float(low) - 1e-6 <= component.gauge[0] * X[0] <= float(high) + 1e-6
-        widths.append(high - low)
-    assert len(widths) > 2
-
-
-def test_the_mean_of_undirected_graphs_is_exact_for_every_signal():
-    family = Family.from_intervals([("a", "b", 1, 5), ("b", "c", 0, 5), ("a", "c", 1, 2)], undirected=True)
-    quotient = Quotient.of(decide(family)[0])
-    function = search_family(quotient).functions[0]
-    third = Fraction(1, 3)
-    x = [Fraction(1), Fraction(2), Fraction(6)]
-    assert weighted_mean_interval(quotient, function, (1, 1, 1), x, (third,) * 3) == (Fraction(3), Fraction(3))
-    with pytest.raises(HypothesisError, match="sum"):
-        weighted_mean_interval(quotient, function, (1, 1, 1), x, (third,) * 2 + (Fraction(0),))
 
 
 # ---------------------------------------------------------------------- boxes

@@ -1,15 +1,12 @@
-"""Where a family that comes to bipartite consensus ends: for unknown constant weights exactly, for every signal nearer.
+"""Where a family that comes to bipartite consensus ends for unknown constant weights, exactly.
 
-**Constant weights.** Let ``z = G X(0)`` and ``c = eta(w)' z``, ``eta(w)`` the normalised left null vector of ``M(L)``.
+Let ``z = G X(0)`` and ``c = eta(w)' z``, ``eta(w)`` the normalised left null vector of ``M(L)``.
 If numbers ``h_k`` satisfy for every node ``k`` of the closed set
 
     z_k + sum_l |w_kl| (h_l - h_k)  <=  c+        at w+ where h_l > h_k, at w- elsewhere,
 
 then ``c <= c+`` for all weights of the mode: multiply by ``eta_k(w) >= 0`` and add. Policy iteration, which solves for
 ``(c, h)`` and takes the worst weights, ends at the maximum, which is so attained. Weights that change may exceed it.
-
-**Every signal.** ``|c - p' G X(0)| <= (kappa / alpha) sqrt(V(0))`` with ``p' 1 = 1``, a common function ``V`` and
-``kappa >= ||p' M(L) G C^r||_(P^-1)`` for every member.
 
 References
 ----------
@@ -28,15 +25,12 @@ import numpy as np
 from lmi.dyadic import dyadic_array, round_to_bits
 from lmi.exact.elementary_enclosures import rounded
 from lmi.sparse_h_matrix import solve
-from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import analyse, find_camps
-from ptcc_certify.lyapunov.family_function import FamilyFunction, mean_constant, rounded_up
 from ptcc_certify.lyapunov.interval_rows import IntervalRows, Policy
-from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.family_kernel import reached
 from ptcc_certify.theorems.lemmas import solve_exact
 
@@ -319,59 +313,6 @@ def _solve_exactly(
     h = [row[0] for row in solution]
     c, h[root] = h[root], zero
     return c, tuple(h)
-
-
-# ---------------------------------------------------------------------- every signal
-
-
-def weighted_mean_interval(
-    quotient: Quotient,
-    function: FamilyFunction,
-    camps: Sequence[int],
-    x: Sequence[Fraction],
-    p: Sequence[Fraction] | None = None,
-) -> Interval:
-    """Enclose the consensus value ``c`` of every signal about the weighted mean ``p' G X(0)``.
-
-    Parameters
-    ----------
-    quotient : Quotient
-    function : FamilyFunction
-        Of positive rate.
-    camps : sequence of N +1/-1
-    x : sequence of N Fraction
-    p : sequence of N Fraction, optional
-        With the sum 1. By default near to the left null vector at the middles of all intervals, for which the interval
-        is short; the exact one of undirected graphs makes it a point.
-
-    Raises
-    ------
-    HypothesisError
-        The function does not decay, or the sum is not 1.
-
-    Examples
-    --------
-    >>> from ptcc_certify.lyapunov.family_search import search_family
-    >>> from ptcc_certify.theorems.family_behaviour import decide
-    >>> pair = decide(Family.from_intervals([("a", "b", 9, 11), ("b", "a", 9, 11)]))[0]
-    >>> quotient, x = Quotient.of(pair), (Fraction(0), Fraction(1))
-    >>> low, high = weighted_mean_interval(quotient, search_family(quotient).functions[0], (1, 1), x)
-    >>> round(float(low), 2), round(float(high), 2)
-    (0.44, 0.56)
-    """
-    if function.rate <= 0:
-        raise HypothesisError("the function has no positive rate for every signal")
-    p = middle_left_vector(quotient.family) if p is None else p
-    if sum(p, Fraction(0)) != 1:
-        raise HypothesisError("the sum of the weights is not 1")
-    signed = [weight * camp for weight, camp in zip(p, camps, strict=True)]
-    constant = mean_constant(function, quotient, signed)
-    if constant is None:
-        raise HypothesisError("the matrix of the function is not proved definite")
-    mean = sum((s * y for s, y in zip(signed, x, strict=True)), Fraction(0))
-    reach = 2 / function.rate * root_above(constant * function.value(quotient.coordinates(x)))
-    reach = rounded_up(reach)
-    return mean - reach, mean + reach
 
 
 def middle_left_vector(family: Family) -> tuple[Fraction, ...]:

@@ -23,6 +23,7 @@ from ptcc_certify.bounds.input.effort import (
     Effort,
     Peak,
     SlidingPart,
+    Threshold,
     first_input,
 )
 from ptcc_certify.bounds.input.energy import energy_integral
@@ -102,7 +103,7 @@ def bound_effort(request: InputRequest) -> Effort:
     bounded, by = _decide_boundedness(structure, gain.pole, *request.rates, still)
     lower, upper = (None if r is None else gain.pole * r / 2 for r in request.rates)
     sliding = _sliding_part(request)
-    effort = Effort(bounded, by, (lower, upper), None, (None,) * len(request.forms), sliding=sliding)
+    effort = Effort(bounded, by, Threshold(lower, upper), None, (None,) * len(request.forms), sliding=sliding)
     if (request.initial_state is None and request.initial_set is None) or still or n > INPUT_NODES:
         return effort
     constants = tuple(None if c is None else tuple(c) for c in request.constants)
