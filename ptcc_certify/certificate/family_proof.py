@@ -15,8 +15,8 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import float_up
 from lmi.exact.numbers import integers
+from ptcc_certify.bounds.deviation.component_bounds import ComponentBounds, FunctionOf, RestStates
 from ptcc_certify.bounds.deviation.heard import HeardRows
-from ptcc_certify.bounds.deviation.of_family import ComponentBounds, FunctionOf, RestStates
 from ptcc_certify.bounds.final_state.attracting_box import AttractingBox
 from ptcc_certify.bounds.final_state.kept_means import LeadingGroup, leading_groups
 from ptcc_certify.bounds.final_state.labelled_ends import FinalEnds

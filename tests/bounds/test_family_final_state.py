@@ -19,9 +19,9 @@ from row_families import (
 )
 from scipy.linalg import expm
 
-import ptcc_certify.bounds.final_state.of_family as module
+import ptcc_certify.bounds.final_state.constant_weights as module
 from ptcc_certify.bounds.final_state.attracting_box import attracting_box, invariant_intervals
-from ptcc_certify.bounds.final_state.of_family import final_value, value_ends
+from ptcc_certify.bounds.final_state.constant_weights import value_ends
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.family_rows import follower_decay
@@ -33,9 +33,9 @@ def compare_with_vertices(seed: int) -> None:
     rng = random.Random(seed)
     family = random_consensus(rng)
     x = random_state(rng, family.n_nodes)
-    value = final_value(family.modes[0], x)
-    values = values_of_vertices(family.modes[0], [int(g) * v for g, v in zip(value.camps, x, strict=True)])
-    assert value.exact and (value.lower, value.upper) == (min(values), max(values))
+    ends = value_ends(family.modes[0], x)
+    values = values_of_vertices(family.modes[0], [g * v for g, v in zip(ends.camps, x, strict=True)])
+    assert ends.within == 0 and (ends.lower, ends.upper) == (min(values), max(values))
 
 
 @pytest.mark.few(16)
@@ -56,11 +56,11 @@ def test_final_values_of_large_groups_enclose_the_vertices_closely(seed, monkeyp
     rng = random.Random(seed)
     family = random_consensus(rng)
     x = random_state(rng, family.n_nodes)
-    value = final_value(family.modes[0], x)
-    values = values_of_vertices(family.modes[0], [int(g) * v for g, v in zip(value.camps, x, strict=True)])
+    ends = value_ends(family.modes[0], x)
+    values = values_of_vertices(family.modes[0], [g * v for g, v in zip(ends.camps, x, strict=True)])
     low, high = min(values), max(values)
-    assert value.lower <= low <= value.reached_lower and value.reached_upper <= high <= value.upper
-    assert max(value.reached_lower - value.lower, value.upper - value.reached_upper) < 1e-6
+    assert ends.lower <= low <= ends.lower + ends.within and ends.upper - ends.within <= high <= ends.upper
+    assert max(low - ends.lower, ends.upper - high) < 1e-6
 
 
 def test_followers_have_no_say_and_camps_turn_the_interval():
@@ -72,16 +72,16 @@ def test_followers_have_no_say_and_camps_turn_the_interval():
 def test_undirected_edges_keep_the_mean_where_directions_apart_would_not():
     edges = [("a", "b", 1, 9)]
     x = [Fraction(0), Fraction(1)]
-    tied = final_value(Family.from_intervals(edges, undirected=True).modes[0], x)
-    apart = final_value(Family.from_intervals([*edges, ("b", "a", 1, 9)]).modes[0], x)
-    assert tied.exact and tied.lower == tied.upper == Fraction(1, 2)
+    tied = value_ends(Family.from_intervals(edges, undirected=True).modes[0], x)
+    apart = value_ends(Family.from_intervals([*edges, ("b", "a", 1, 9)]).modes[0], x)
+    assert tied.within == 0 and tied.lower == tied.upper == Fraction(1, 2)
     assert (apart.lower, apart.upper) == (Fraction(1, 10), Fraction(9, 10))
 
 
 def test_weights_that_change_leave_the_interval_of_constant_ones():
     """By a quarter of its length: agent 1 first listens as much as it can, then agent 2 listens to agent 1."""
     family = Family.from_intervals([(0, 1, 1, 2), (1, 2, 1, 2), (2, 0, 1, 2), (2, 1, 1, 2)])
-    value = final_value(family.modes[0], [Fraction(2), Fraction(-1), Fraction(1)])
+    value = value_ends(family.modes[0], [Fraction(2), Fraction(-1), Fraction(1)])
     assert (value.lower, value.upper) == (Fraction(2, 5), 1)
     first, then = (np.array([[1, 0, -1], [-2, d, 2 - d], [0, -w, w]]) for d, w in ((4, 1), (3, 2)))
     X = expm(-100.0 * then) @ expm(-0.4 * first) @ [2, -1, 1]
@@ -94,7 +94,7 @@ def test_weights_that_change_leave_the_interval_of_constant_ones():
 def test_a_mode_without_consensus_has_no_final_value(edges):
     family = Family.from_intervals(edges)
     with pytest.raises(HypothesisError):
-        final_value(family.modes[0], [Fraction(1)] * family.n_nodes)
+        value_ends(family.modes[0], [Fraction(1)] * family.n_nodes)
 
 
 # ---------------------------------------------------------------------- boxes

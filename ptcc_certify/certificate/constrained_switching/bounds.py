@@ -14,7 +14,7 @@ from fractions import Fraction
 import numpy as np
 
 from lmi.exact.numbers import integers
-from ptcc_certify.bounds.deviation.of_family import ComponentBounds, FunctionOf
+from ptcc_certify.bounds.deviation.component_bounds import ComponentBounds, FunctionOf
 from ptcc_certify.bounds.instants import Instants
 from ptcc_certify.certificate.constrained_switching.claims import RateClaim
 from ptcc_certify.certificate.family_proof import BoundFunction, ComponentProof, FamilyProof
