@@ -17,13 +17,13 @@ docs/theory/families.md, "Where it ends", "Disturbances" and "Inputs".
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from lmi.exact.decimal_rounding import float_down
+from lmi.exact.decimal_rounding import float_down, float_up
 from ptcc_certify.bounds.decay import Decay
 from ptcc_certify.bounds.deviation.heard import HeardRows
 from ptcc_certify.bounds.instants import Instants
@@ -33,7 +33,6 @@ from ptcc_certify.checker.family_bounds import least
 from ptcc_certify.checker.family_function import Scaled
 from ptcc_certify.checker.family_sliding import Drive
 from ptcc_certify.checker.reading import Interval
-from ptcc_certify.graphs.rationals import nearest_float
 
 _SLACK = 1 + 1e-12
 #: Bits beyond those of the sizes to which shares of these are rounded up.
@@ -140,7 +139,8 @@ class ComponentBounds:
         bounds, finite = self.by_functions(at), np.isfinite(at.clock)
         rate = max((float(one.function.rate) for one in self.functions), default=0.0)
         if self.rows is not None and self.ends is not None and rate > 0 and finite.any():
-            start = np.array([above(max(abs(x - e) for e in ends)) for x, ends in zip(self.x, self.ends, strict=True)])
+            pairs = zip(self.x, self.ends, strict=True)
+            start = np.array([float_up(max(abs(x - end) for end in ends)) for x, ends in pairs])
             followed = self.rows.follow(start, lambda s: self.by_functions(Instants(s)), at.clock[finite], rate)
             bounds[:, finite] = np.fmin(bounds[:, finite], followed)
         return bounds
@@ -164,9 +164,9 @@ class ComponentBounds:
         assert self.phase is not None
         left = self.phase.rest(at)
         with np.errstate(over="ignore", invalid="ignore"):
-            driven = decay.times(1.0, at) + above(self.drive.constant(V) / unit) * left
+            driven = decay.times(1.0, at) + float_up(self.drive.constant(V) / unit) * left
             bounds = np.multiply.outer(_floats(V.speeds, n, unit * 2 / V.rate), driven)
-            bounds += np.multiply.outer([above(self.drive.sizes[k]) for k in range(n)], left)
+            bounds += np.multiply.outer([float_up(self.drive.sizes[k]) for k in range(n)], left)
             if rest is not None and one.rest is not None:
                 near = decay.times(_floats([rest], n, unit), at)
                 bounds = np.fmin(bounds, near if not one.rest.groups else np.where(left == 0, near, np.inf))
@@ -179,12 +179,14 @@ class ComponentBounds:
         bounds = np.full((len(self.x), at.clock.size), np.inf)
         with np.errstate(over="ignore", invalid="ignore"):
             for one in self.functions:
+                if self.drive is not None and one.function.rate <= 0:
+                    continue
                 decay, unit = self.decay(one)
                 speeds = _floats(one.function.speeds, one.agents.size, unit)
                 own = decay.times(speeds, at) * gain
                 own[np.isinf(speeds)] = np.inf
                 if self.drive is not None and self.phase is not None:
-                    sizes = [above(self.drive.sizes[k]) for k in range(len(self.x))]
+                    sizes = [float_up(self.drive.sizes[k]) for k in range(len(self.x))]
                     own = (own + np.multiply.outer(sizes, gain * self.phase.share_at(at))) * _SLACK
                 bounds[one.agents] = np.fmin(bounds[one.agents], own)
             if self.rows is not None and self.drive is None:
@@ -196,12 +198,12 @@ class ComponentBounds:
         """Return what bounds ``sqrt(V(x - sigma))`` over time, in a unit, and that."""
         V = one.function
         root = V.root([self.x[v] for v in one.agents.tolist()])
-        if self.drive is None:
-            return Decay(float_down(V.rate), 1.0 if root else 0.0), root
-        c = self.drive.constant(V)
-        unit = root or c or Fraction(1)
-        assert self.phase is not None
-        return Decay(float_down(V.rate), above(root / unit), self.phase, above(c / unit) * self.phase.shares), unit
+        c = Fraction(0) if self.drive is None else self.drive.constant(V)
+        unit = max(root, c) or Fraction(1)
+        decay = Decay(float_down(V.rate), float_up(root / unit))
+        if self.phase is not None:
+            decay = replace(decay, phase=self.phase, push=float_up(c / unit) * self.phase.shares)
+        return decay, unit
 
     def _sliding(self, at: Instants) -> np.ndarray:
         """Bound ``|sigma_k|``, (n, M)."""
@@ -213,9 +215,4 @@ class ComponentBounds:
 def _floats(bounds: Sequence[Scaled], n: int, unit: Fraction) -> np.ndarray:
     """Return the least bound of every node times a unit in floats that are not below; infinity where there is none."""
     values, scale = least(bounds)
-    return np.array([above(values[k] * unit / scale) if k in values else np.inf for k in range(n)])
-
-
-def above(x: Fraction) -> float:
-    """Return a float that is not below; infinity beyond their range."""
-    return nearest_float(x) * _SLACK
+    return np.array([float_up(values[k] * unit / scale) if k in values else np.inf for k in range(n)])
