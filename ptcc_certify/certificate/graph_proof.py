@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ptcc_certify.bounds.agents.each_agent import error_constants
 from ptcc_certify.bounds.delay.case import DecayingForm
 from ptcc_certify.bounds.delay.late_messages import late_obligations
 from ptcc_certify.bounds.deviation.from_final_state import DeviationGeometry
@@ -364,8 +365,7 @@ class GraphProof(Proof):
             if form is None or form.coordinates != "E" or V.deviation is None or not V.proved_rate > 0:
                 continue
             if form.diagonal is not None:
-                weight = dict(zip(form.nodes, form.diagonal, strict=True))
-                constants = tuple(1 / weight[v] if v in weight else Fraction(0) for v in range(self.graph.n_nodes))
+                constants = error_constants(self.structure, V)
             if constants is not None:
                 found.append(DecayingForm(k, form, constants, V.deviation.agents))
         return found

@@ -31,6 +31,7 @@ from ptcc_certify.bounds.input.initial_sets import largest_deviation
 from ptcc_certify.bounds.input.residual_under_limits import LimitedBounds, bound_disturbed
 from ptcc_certify.bounds.input.tightest_bound import best_bound, least_bound, round_up, usable_functions
 from ptcc_certify.checker import INPUT_NODES
+from ptcc_certify.checker.family_sliding import last_time
 from ptcc_certify.checker.input_formulas import (
     Form,
     InitialSet,
@@ -42,6 +43,7 @@ from ptcc_certify.checker.input_formulas import (
     peak_above,
     root_above,
 )
+from ptcc_certify.checker.protocol import sliding_bounded, sliding_part
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.model import Protocol
 
@@ -159,10 +161,8 @@ def _sliding_part(request: InputRequest) -> SlidingPart | None:
     protocol, sigma0 = request.protocol.reaching, request.sigma0
     if protocol is None or sigma0 is None:
         return None
-    drive = protocol.reaching_gain
-    if drive.pole < 1 and any(sigma0):
-        return SlidingPart(False, None)
-    return SlidingPart(drive.pole >= 1, tuple(protocol.mu1 + drive.first * abs(s) for s in sigma0))
+    own = sliding_part(protocol.parameters, sigma0)
+    return SlidingPart(sliding_bounded(protocol.parameters), None if own is None else tuple(own))
 
 
 def _reaching_phase(request: InputRequest) -> Reaching | None:
@@ -170,9 +170,8 @@ def _reaching_phase(request: InputRequest) -> Reaching | None:
     protocol, sigma0, times = request.protocol.reaching, request.sigma0, request.reaching
     if protocol is None or sigma0 is None or not any(sigma0):
         return None
-    last = [None] if times is None else [z for z, s in zip(times, sigma0, strict=True) if s]
     drive, push = protocol.reaching_gain, protocol.mu1 + protocol.delta
-    quiet = None if None in last else max(z for z in last if z is not None)
+    quiet = None if times is None else last_time(times, sigma0)
     return Reaching(sigma0, protocol.T_r, protocol.T_s, drive.rho1, drive.pole, push, quiet)
 
 
