@@ -52,7 +52,6 @@ IN_ROOMS = {
     "simulation.trajectory": ("Sliding",),
     "bounds.final_state.of_graph": ("FinalState", "Influence"),
     "bounds.envelope": ("Envelope", "Comparison"),
-    "bounds.sliding_envelope": ("SlidingEnvelope",),
     "bounds.input.effort": ("Effort",),
     "bounds.input.initial_sets": ("initial_set_within",),
     "bounds.input.worst_initial_state": ("WorstInitialState",),

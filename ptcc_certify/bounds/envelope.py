@@ -1,9 +1,18 @@
-"""What a proved rate says over time, and how a simulated trajectory compares with it."""
+r"""What a proved rate says over time, and how a simulated trajectory compares with it.
+
+Under the sliding-mode protocol, with ``y = x - sigma`` and ``A`` the matrix of the coordinates ``z`` (rows of ``E``, or
+``eps``),
+
+    z_y' = -gain (A z_y + B sigma),      sqrt(V)' <= -(rate/2) gain sqrt(V) + gain || |B| |sigma| ||_Omega
+
+so that ``|| |B| b ||_Omega`` drives the decay of ``sqrt(V(y))``, where ``b_k`` bounds ``|sigma_k|`` whatever the
+disturbance. The coordinates of ``x`` are those of ``y`` and of ``sigma``: ``||z_x||_Omega <= sqrt(V(y)) + || |C| b
+||_Omega``.
+"""
 
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -13,7 +22,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_up
+from ptcc_certify.bounds.decay import Decay, decayed
 from ptcc_certify.bounds.final_state.of_graph import Influence, influence
+from ptcc_certify.bounds.instants import Instants, clock_values, remaining_part
+from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import as_state
 from ptcc_certify.graphs.rationals import shorten
@@ -29,71 +41,6 @@ FRACTIONS = (0.5, 0.9, 0.99)
 LAST_INSTANTS = (1e-6, 1e-9)
 #: The integrator's error is taken to be below this multiple of its tolerance times the size of the state.
 FLOOR_FACTOR = 1000.0
-
-
-def remaining_part(remaining: Any, name: str = "remaining") -> np.ndarray:
-    """Return values of ``1 - t/T`` as floats, or refuse what is no instant up to the deadline.
-
-    Raises
-    ------
-    ParameterError
-        A value is not a number from 0 to 1.
-
-    Examples
-    --------
-    >>> remaining_part([1, 0.5])
-    array([1. , 0.5])
-    >>> remaining_part(1.9)
-    Traceback (most recent call last):
-    ptcc_certify.errors.ParameterError: remaining = 1.9 is outside its domain; it is 1 - t/T, from 1 at 0 to 0 at T
-    """
-    return _within(remaining, name, 1.0, "it is 1 - t/T, from 1 at 0 to 0 at T")
-
-
-def clock_values(clock: Any, name: str = "clock") -> np.ndarray:
-    """Return values of a clock as floats, or refuse those before its start.
-
-    Raises
-    ------
-    ParameterError
-        A value is negative or not a number.
-
-    Examples
-    --------
-    >>> clock_values(np.inf)
-    array(inf)
-    """
-    return _within(clock, name, math.inf, "a clock is 0 at the start and infinite at its deadline")
-
-
-def instants_from_0(t: Any, name: str = "t") -> np.ndarray:
-    """Return instants as an array of floats, one number as an array of one; or refuse what is none from 0 on.
-
-    Raises
-    ------
-    ParameterError
-        A value is negative, infinite or not a number.
-
-    Examples
-    --------
-    >>> instants_from_0(0.5)
-    array([0.5])
-    """
-    return np.atleast_1d(_within(t, name, sys.float_info.max, "instants are from 0 on"))
-
-
-def _within(values: Any, name: str, most: float, domain: str) -> np.ndarray:
-    try:
-        entries = np.asarray(values)
-        if entries.dtype.kind in "bUS":
-            raise TypeError("truth values and texts are no numbers")
-        array = entries.astype(float)
-    except (TypeError, ValueError):
-        raise ParameterError(name, f"= {shorten(repr(values))} is not a number, nor an array of numbers") from None
-    outside = array[~((array >= 0) & (array <= most))]  # NaN is neither
-    if outside.size:
-        raise ParameterError(name, f"= {outside.flat[0]:.12g} is outside its domain; {domain}")
-    return array
 
 
 @dataclass(frozen=True)
@@ -161,13 +108,6 @@ class Comparison:
         return worst > 1 + 1e-6 or self.reaching_kept is False
 
 
-class Instants(NamedTuple):
-    """Where bounds are asked: values of the clock, and of ``z = ln(T_r/(T_r - t))`` if there is a reaching phase."""
-
-    clock: np.ndarray
-    z: Any = None
-
-
 class History(NamedTuple):
     """``sqrt(V)`` of one run and its bound over time, (M,) each, and the floor ``f`` of the integrator."""
 
@@ -180,15 +120,20 @@ class History(NamedTuple):
 class Envelope:
     """The pointwise best of several bounds ``V_i(t) <= e^(-rate_i s(t)) V_i(0)``.
 
+    Under the sliding-mode protocol for one ``sigma(0)`` and every disturbance within ``delta``, through the reaching
+    phase and on to ``T_r + T_s``.
+
     Attributes
     ----------
     structure : Structure
     gain : Gain
     functions : tuple of LyapunovFunction
+    phase : ReachingPhase or None
+        The sliding variables; None under the nominal protocol.
 
     References
     ----------
-    Theorems 1 to 3 and Lemma 6 of [Zhu]_.
+    Theorems 1 to 6, Lemma 6 and Proposition 1 of [Zhu]_.
 
     Examples
     --------
@@ -200,11 +145,16 @@ class Envelope:
     True
     >>> bool(envelope.deviation(envelope.gain.clock(0.99), [3, 1]).max() < 0.01)
     True
+    >>> robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+    >>> envelope = certify(pair, robust, InitialState([3, 1], sigma0=[1, 0]), asks=Asks(simulation=False)).envelope
+    >>> bool(envelope.deviation_bound(0.01, [3, 1]).max() < 0.01)  # of every agent at 0.99 (T_r + T_s)
+    True
     """
 
     structure: Structure
     gain: Gain
     functions: tuple[LyapunovFunction, ...]
+    phase: ReachingPhase | None = None
 
     @cached_property
     def _laplacian(self) -> object:
@@ -222,6 +172,39 @@ class Envelope:
     @property
     def _in_norm(self) -> list[LyapunovFunction]:
         return [m for m in self.functions if m.coordinates == self.coordinates]
+
+    @property
+    def _moving(self) -> ReachingPhase | None:
+        """The reaching phase in which sliding variables move; None where there is none, or ``sigma(0) = 0``."""
+        return self.phase if self.phase is not None and any(self.phase.sigma0) else None
+
+    @property
+    def direct(self) -> bool:
+        """Whether no sliding variable moves: the bounds are those of the nominal protocol."""
+        return self._moving is None
+
+    # ------------------------------------------------------------------ instants
+
+    def _at(self, clock: Any) -> Instants:
+        """Return the instants at values of the clock, or refuse them, and all where there is a reaching phase."""
+        if not self.direct:
+            raise ParameterError("sigma(0) is not 0: in the reaching phase ask norm_bound or deviation_bound")
+        return Instants(clock_values(clock))
+
+    def _when(self, remaining: Any) -> Instants:
+        """Return the instants where ``1 - t/T`` is ``remaining``, or refuse them."""
+        if self._moving is not None:
+            return self._moving.instants(remaining)
+        return Instants(np.asarray(self.gain.clock_at_remaining(remaining_part(remaining))))
+
+    def _of(self, trajectory: Trajectory) -> Instants:
+        """Return the samples of a run."""
+        if trajectory.sliding is None:
+            return Instants(trajectory.clock)
+        with np.errstate(divide="ignore"):
+            return Instants(trajectory.clock, -np.log(trajectory.sliding.reaching_remaining))
+
+    # ------------------------------------------------------------------ bounds
 
     def norm_factor(self, clock: np.ndarray | float) -> np.ndarray:
         """Bound of ``||z(t)|| / ||z(0)||`` at clock values ``s``: ``min_i sqrt(overshoot_i) e^(-rate_i s / 2)``.
@@ -243,9 +226,9 @@ class Envelope:
             A value is negative or not a number; or there is a reaching phase: sliding variables drive the agents, and
             no multiple of their initial value bounds them.
         """
-        clock = self._at(clock).clock
-        factors = (_decay(math.sqrt(m.overshoot_above), m.rate_below, clock) for m in self._in_norm)
-        return np.minimum.reduce([np.full_like(clock, np.inf), *factors])
+        at = self._at(clock)
+        factors = (Decay(m.rate_below, math.sqrt(m.overshoot_above)).times(1.0, at) for m in self._in_norm)
+        return np.minimum.reduce([np.full_like(at.clock, np.inf), *factors])
 
     def residual(self, remaining: float) -> float:
         """Bound of ``||z(t)|| / ||z(0)||`` where ``1 - t/T`` equals ``remaining``: what is left at that instant.
@@ -267,18 +250,6 @@ class Envelope:
         if np.ndim(remaining):
             raise ParameterError("remaining is one number from 0 to 1; for several instants ask norm_bound")
         return float(self.norm_factor(self._when(remaining).clock))
-
-    def _at(self, clock: Any) -> Instants:
-        """Return the instants at values of the clock, or refuse them."""
-        return Instants(clock_values(clock))
-
-    def _when(self, remaining: Any) -> Instants:
-        """Return the instants where ``1 - t/T`` is ``remaining``, or refuse them."""
-        return Instants(np.asarray(self.gain.clock_at_remaining(remaining_part(remaining))))
-
-    def _of(self, trajectory: Trajectory) -> Instants:
-        """Return the samples of a run."""
-        return Instants(trajectory.clock)
 
     def bound(self, clock: np.ndarray | float, x0: Any) -> np.ndarray:
         """Bound of ``||z||`` at clock values ``s`` from ``x0``: ``min_i sqrt(e^(-rate_i s) V_i(0) / lmin(P_i))``.
@@ -306,6 +277,8 @@ class Envelope:
     def norm_bound(self, remaining: Sequence[float] | np.ndarray | float, x0: Any) -> np.ndarray:
         """Bound of ``||z||`` from ``x0``, (M,), at the instants where ``1 - t/T`` is ``remaining``, (M,).
 
+        Whatever the disturbance; ``T = T_r + T_s`` under the sliding-mode protocol.
+
         Raises
         ------
         ParameterError
@@ -315,9 +288,54 @@ class Envelope:
 
     def _norms(self, at: Instants, x0: Sequence[Fraction]) -> np.ndarray:
         """Return the bounds of ``||z||`` from ``x0``."""
-        initial_values = self._initial_values(self._in_norm, x0)
-        bounds = (_decay(root / math.sqrt(m.lowest_below), m.rate_below, at.clock) for m, root in initial_values)
-        return np.minimum.reduce([np.full_like(at.clock, np.inf), *bounds])
+        unit = self._unit(x0) if self._moving else 1.0
+        bound = np.full_like(at.clock, np.inf)
+        for m, decay in self._decays(self._in_norm, x0, unit):
+            least = math.sqrt(m.lowest_below)
+            with np.errstate(over="ignore"):
+                norm = decay.times(1 / least, at) + self._sliding_norm(m, at, unit) / least * (1 + 1e-12)
+                bound = np.minimum(bound, norm * unit)
+        return bound
+
+    def _decays(
+        self, functions: Iterable[LyapunovFunction], x0: Sequence[Fraction], unit: float
+    ) -> Iterator[tuple[LyapunovFunction, Decay]]:
+        """Yield functions with what bounds ``sqrt(V)`` over time, of ``x - sigma``, in that unit.
+
+        Where sliding variables move, of those that decay: one that bounds only the growth would end in infinity.
+        """
+        phase = self._moving
+        wanted = [m for m in functions if phase is None or m.rate_below > 0]
+        for m, root in self._initial_values(wanted, [x / Fraction(unit) for x in self._nominal_state(x0)]):
+            if phase is None:
+                yield m, Decay(m.rate_below, root)
+            else:
+                yield m, Decay(m.rate_below, root, phase, self._pushes(m) * (self._unit(()) / unit))
+
+    def _pushes(self, function: LyapunovFunction) -> np.ndarray:
+        """Return what drives a function in every piece of the reaching phase, in units of ``sigma(0)``."""
+        if id(function) not in self._known_pushes:
+            assert self.phase is not None
+            drive = self._size_of(function, self._laplacian)
+            sizes = self.phase.sizes(self.phase.pieces) / self._unit(())
+            self._known_pushes[id(function)] = np.append(_column_norms(drive @ sizes), 0.0)
+        return self._known_pushes[id(function)]
+
+    @cached_property
+    def _known_pushes(self) -> dict[int, np.ndarray]:
+        return {}
+
+    def _size_of(self, function: LyapunovFunction, after: Any = None) -> np.ndarray:
+        """Return ``|R C|``, ``P = R'R``, with ``C`` from states to coordinates, or ``|R C after|``."""
+        L: Any = self._laplacian
+        C = L[function.rows] if function.coordinates == "E" else function.coordinates_of(np.eye(L.shape[0]), L)
+        whole = C if after is None else C @ after
+        return np.abs(function.scaled(whole if isinstance(whole, np.ndarray) else whole.toarray()))
+
+    def _sliding_norm(self, function: LyapunovFunction, at: Instants, unit: float) -> np.ndarray | float:
+        """Return ``|| |C| b ||_Omega``, what sliding variables are in the coordinates of a function, in that unit."""
+        phase = self._moving
+        return 0.0 if phase is None else _column_norms(self._size_of(function) @ (phase.sizes(at.z) / unit))
 
     def deviation_bound(self, remaining: np.ndarray | Sequence[float] | float, x0: Any) -> np.ndarray:
         """Bound of ``|x_k - final_state_k|`` from ``x0`` where ``1 - t/T`` is ``remaining``.
@@ -370,16 +388,21 @@ class Envelope:
         return self._deviations(self._at(clock), as_state(x0, self.structure.graph))[-1]
 
     def _deviations(self, at: Instants, x0: Sequence[Fraction], unit: float | None = None) -> np.ndarray:
-        """Return the bounds of every agent and of the norm, (N + 1, M), in that unit or in 1."""
-        x0 = [x / Fraction(unit or 1) for x in x0]
+        """Return the bounds of every agent and of the norm, (N + 1, M), in that unit or in 1.
+
+        Those of ``x - sigma``, and ``|sigma|`` besides.
+        """
+        phase = self._moving
+        own = unit or (self._unit(x0) if phase else 1.0)
         bounds = np.full((len(x0) + 1, *at.clock.shape), 0.0 if self._still else np.inf)
-        for m, root in self._initial_values(self._with_deviation, x0):
-            with np.errstate(over="ignore", invalid="ignore"):
-                size = np.nan_to_num(deviation_constants(m) * root, posinf=np.inf)  # 0 times inf is 0
-            bounds = np.minimum(bounds, _decay(size, m.rate_below, at.clock))
+        for m, decay in self._decays(self._with_deviation, x0, own):
+            bounds = np.minimum(bounds, decay.times(deviation_constants(m), at))
+        if phase is not None:
+            size = phase.sizes(np.atleast_1d(at.z)) / own
+            bounds += np.vstack([size, _column_norms(size)]).reshape(bounds.shape)
         if self._with_deviation:
-            bounds = np.minimum(bounds.T, self._largest_deviations(x0)).T
-        return bounds
+            bounds = np.minimum(bounds.T, self._largest_deviations(x0, own)).T
+        return bounds if unit or phase is None else bounds * own * (1 + 1e-15)
 
     @property
     def _with_deviation(self) -> list[LyapunovFunction]:
@@ -395,11 +418,12 @@ class Envelope:
         return influence(self.structure)
 
     def _nominal_state(self, x0: Sequence[Fraction]) -> list[Fraction]:
-        """Return the initial state from which the nominal motion has the same final state."""
-        return list(x0)
+        """Return the initial state from which the nominal motion has the same final state: ``x(0) - sigma(0)``."""
+        phase = self._moving
+        return list(x0) if phase is None else [x - sigma for x, sigma in zip(x0, phase.sigma0, strict=True)]
 
-    def _largest_deviations(self, x0: Sequence[Fraction]) -> np.ndarray:
-        """Return what no deviation of an agent and no norm of them, (N + 1,), ever exceeds, rounded up.
+    def _largest_deviations(self, x0: Sequence[Fraction], unit: float) -> np.ndarray:
+        """Return what no deviation of an agent and no norm of them, (N + 1,), ever exceeds, in that unit, rounded up.
 
         That is ``max_k |x_k(0) - final_state_k|``, and under the sliding-mode protocol ``sum_k |sigma_k(0)|`` more:
         ``d = x - final_state`` obeys ``d' = -gain L d + sigma'``, every ``|sigma_k|`` falls to 0, and ``e^(-L s)`` does
@@ -407,7 +431,8 @@ class Envelope:
         """
         nominal = self._nominal_state(x0)
         gaps = (abs(x - Fraction(end)) for x, end in zip(x0, self._influence.apply(nominal)[0], strict=True))
-        most = float_up(max(gaps) + sum((abs(x - y) for x, y in zip(x0, nominal, strict=True)), Fraction(0)))
+        whole = max(gaps) + sum((abs(x - y) for x, y in zip(x0, nominal, strict=True)), Fraction(0))
+        most = float_up(whole / Fraction(unit))
         return np.append(np.full(len(x0), most), most * math.sqrt(len(x0)) * (1 + 1e-15))
 
     @cached_property
@@ -426,11 +451,16 @@ class Envelope:
             yield function, float(np.sqrt(function.value(relative))) * (1 + 1e-12) * float_up(top) if top else 0.0
 
     def _unit(self, x0: Iterable[Any]) -> float:
-        """Return the size of the initial state, in which squares neither overflow nor vanish."""
-        return max((abs(float(x)) for x in x0), default=0.0) or 1.0
+        """Return the size of a state and of ``sigma(0)``, in which squares neither overflow nor vanish."""
+        sigma0 = () if self.phase is None else self.phase.sigma0
+        return max((abs(float(x)) for x in (*x0, *sigma0)), default=0.0) or 1.0
+
+    # ------------------------------------------------------------------ runs
 
     def compare(self, trajectory: Trajectory) -> Comparison:
-        """Compare a simulated run with every Lyapunov function; see :class:`Comparison`.
+        """Compare a simulated run with every bound: Lyapunov functions, sliding variables, reaching times.
+
+        See :class:`Comparison`.
 
         Several initial states at once, or the components of vector-valued agents, are judged column by column (a bound
         that holds for every column holds for their sum). ``V`` is quadratic: initial states and weights of any size are
@@ -450,10 +480,12 @@ class Envelope:
         ------
         ParameterError
             The run is of another graph or protocol, disturbed or held over periods under the nominal protocol, or has
-            no sample before the deadline.
+            no sample before the deadline; under the sliding-mode protocol it begins later than 0, from another
+            ``sigma(0)``, or is the boundary-layer imitation, of which nothing was proved.
         """
         if not isinstance(trajectory, Trajectory):
             raise ParameterError(f"{shorten(repr(trajectory))} is no run; give what simulate returned")
+        sliding_ratio, reaching_kept = (None, None) if self.phase is None else _compare_sliding(self.phase, trajectory)
         if trajectory.conditions.forcing is not None or trajectory.held_input is not None:
             raise ParameterError("the bounds are for undisturbed runs whose input is not held over periods")
         if trajectory.graph.labels != self.structure.graph.labels or trajectory.graph != self.structure.graph:
@@ -494,7 +526,9 @@ class Envelope:
             ratios,
             float(before.min()),
             trajectory.deadline_resolved,
+            sliding_ratio=sliding_ratio,
             deviation_ratio=self._deviation_ratio(trajectory, judged),
+            reaching_kept=reaching_kept,
         )
 
     def _deviation_ratio(self, trajectory: Trajectory, judged: np.ndarray) -> float | None:
@@ -520,6 +554,8 @@ class Envelope:
     def histories(self, function: LyapunovFunction, trajectory: Trajectory) -> list[History]:
         """Return ``sqrt(V)`` and its bound along a run, column by column, in units of the initial state.
 
+        Where sliding variables move, of ``x`` and of ``x - sigma``.
+
         Parameters
         ----------
         function : LyapunovFunction
@@ -532,15 +568,31 @@ class Envelope:
         list of History
             One for each column of the states.
         """
+        if not self.direct:
+            return list(self._driven_histories(function, trajectory))
         result = []
         for x in _columns(trajectory):
             x = x / self._unit(x[:, 0])
             z = function.coordinates_of(x, self._laplacian)
             unit = float(np.abs(z[:, 0]).max(initial=0.0)) or 1.0
             root = np.sqrt(function.value(z / unit))
-            bound = _decay(root[0], function.rate_below, trajectory.clock - trajectory.clock[0])
+            bound = decayed(root[0], function.rate_below, trajectory.clock - trajectory.clock[0])
             result.append(History(root, bound, FLOOR_FACTOR * trajectory.rtol * self._state_scale(function, x, unit)))
         return result
+
+    def _driven_histories(self, function: LyapunovFunction, trajectory: Trajectory) -> Iterator[History]:
+        assert trajectory.sliding is not None
+        states, at = trajectory.states, self._of(trajectory)
+        own, x0 = self._unit(states[:, 0]), [Fraction(x) for x in states[:, 0].tolist()]
+        x, y = states / own, (states - trajectory.sliding.sigma) / own
+        size, sliding = max(float(np.abs(part).max()) for part in (x, y)), self._sliding_norm(function, at, own)
+        for _, decay in self._decays([function], x0, own):
+            v = decay.times(1.0, at)
+            unit = float((v + sliding).max()) or 1.0
+            floor = FLOOR_FACTOR * trajectory.rtol * size * self._state_scale(function, np.ones((len(y), 1)), unit)
+            for part, bound in ((x, v + sliding), (y, v)):
+                root = np.sqrt(function.value(function.coordinates_of(part, self._laplacian) / unit))
+                yield History(root, bound / unit, floor)
 
     def _state_scale(self, function: LyapunovFunction, states: np.ndarray, unit: float) -> float:
         """Bound ``sqrt(V(dz)) / unit`` for errors as large as the largest state: tolerances are of the whole."""
@@ -553,18 +605,6 @@ class Envelope:
         return float(np.linalg.norm(root * size if root.ndim == 1 else root @ size))
 
 
-def _decay(size: np.ndarray | float, rate: float, clock: np.ndarray) -> np.ndarray:
-    """Return ``size e^(-rate s / 2)`` for every size and every clock value, rounded up; formed in logarithms.
-
-    At the deadline, where the clock is infinite, 0 if the rate is positive or the size is 0.
-    """
-    with np.errstate(all="ignore"):
-        exponent = np.add.outer(np.log(size), -rate * clock / 2 if rate else np.zeros_like(clock))
-        value = np.exp(exponent) * (1 + 1e-12)
-    value = np.where((value == 0) & (exponent > -np.inf), 5e-324, value)
-    return np.where(np.isnan(value), 0.0, value)
-
-
 def deviation_constants(function: LyapunovFunction) -> np.ndarray:
     """Return what ``sqrt(V)`` is multiplied by in the bounds of all agents and of the norm, (N + 1,)."""
     assert function.deviation is not None
@@ -574,3 +614,38 @@ def deviation_constants(function: LyapunovFunction) -> np.ndarray:
 def _columns(trajectory: Trajectory) -> np.ndarray:
     """Return the states of a run column by column, (S, N, M)."""
     return np.moveaxis(trajectory.states.reshape(len(trajectory.labels), -1, trajectory.t.size), 1, 0)
+
+
+def _compare_sliding(phase: ReachingPhase, trajectory: Trajectory) -> tuple[float, bool]:
+    """Return the largest ratio of sliding variables to their bounds, and whether all were 0 when they certainly are."""
+    run = trajectory.sliding
+    if run is None or run.protocol != phase.protocol:
+        raise ParameterError("the run is of another protocol than the envelope")
+    if run.boundary_layer is not None:
+        raise ParameterError("nothing was proved about the boundary-layer imitation; compare the true solution")
+    sigma0 = np.array([float(x) for x in phase.sigma0])
+    if trajectory.t[0] != 0 or (run.sigma0 != sigma0).any():
+        raise ParameterError("the run starts later than 0, or from another sigma(0) than the envelope")
+    certain = np.array([np.inf if r.z is None else float(r.z) for r in phase.reaching])
+    late = certain * 1e-9
+    if run.reads_states:  # sigma_k is known to the integrator's floor, its root to that over the slope
+        gap = float(phase.protocol.mu1 - phase.protocol.delta) * float(phase.protocol.T_r) * np.exp(-certain)
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+            late = late + np.where(sigma0 != 0, FLOOR_FACTOR * trajectory.rtol * np.abs(sigma0) / gap, 0.0)
+    in_time = bool((run.reaching_z <= certain + late).all())
+    with np.errstate(divide="ignore"):
+        z = -np.log(run.reaching_remaining)
+    bound, size = phase.sizes(z), np.abs(sigma0).max(initial=0.0)
+    excess = np.maximum(np.abs(run.sigma) - FLOOR_FACTOR * trajectory.rtol * size, 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(excess > 0, excess / bound, 0.0)
+        norm = np.linalg.norm(excess / (size or 1.0), axis=0)
+        ratio = np.append(ratio, np.where(norm > 0, norm / (phase.norm(z) / size), 0.0))
+    return float(ratio.max(initial=0.0)), in_time
+
+
+def _column_norms(M: np.ndarray) -> np.ndarray:
+    """Return the Euclidean norms of the columns; nothing is squared that could leave float64."""
+    top = np.abs(M).max(axis=0, initial=0.0)
+    unit = np.where(top > 0, top, 1.0)
+    return np.linalg.norm(M / unit, axis=0) * top * (1 + 1e-12)

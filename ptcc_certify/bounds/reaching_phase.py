@@ -3,27 +3,32 @@
 With ``psi = e^(-mu2 t) ((T_r - t)/T_r)^(mu3 kappa)``, which bounds ``|sigma_k| / |sigma_k(0)|``, and a rate
 ``2 alpha``,
 
-    v(t)  <=  e^(-alpha s(t)) v(0) + c int_0^min(t,T_r) e^(-alpha (s(t) - s(r))) gain(r) psi(r) dr
+    v(t)  <=  e^(-alpha s(t)) v(0) + int_0^min(t,T_r) e^(-alpha (s(t) - s(r))) gain(r) push(r) dr
 
-``psi`` decreases, so that its value at the begin of a piece is the largest.
+where ``push`` is ``c psi`` for families, and a norm of bounds of all ``|sigma_k|`` for one graph. It decreases, so that
+its value at the begin of a piece is the largest.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
 
-from ptcc_certify.bounds.envelope import Instants, remaining_part
+from ptcc_certify.bounds.instants import Instants, clock_values, remaining_part
 from ptcc_certify.model.base import ReachingProtocol
-from ptcc_certify.model.reaching_time import LAST_Z, ReachingTime
+from ptcc_certify.model.reaching_time import LAST_Z, ReachingTime, sliding_bound
 
 _PIECES = 4000
 #: What sums of so many floats may be off by, relatively.
 _SLACK = 1 + 1e-11
+#: Arrays of instants at which sliding variables are kept.
+_KEPT = 8
 
 
 @dataclass(frozen=True)
@@ -34,11 +39,14 @@ class ReachingPhase:
     ----------
     protocol : ReachingProtocol
     reaching : tuple of ReachingTime
-        Proved reaching times.
+        Proved reaching times, one for each agent.
+    sigma0 : tuple of Fraction
+        ``sigma(0)``, N numbers.
     """
 
     protocol: ReachingProtocol
     reaching: tuple[ReachingTime, ...]
+    sigma0: tuple[Fraction, ...]
 
     def instants(self, remaining: Any) -> Instants:
         """Return ``s`` and ``z`` where ``1 - t/(T_r + T_s)`` is ``remaining``, or refuse it."""
@@ -71,35 +79,62 @@ class ReachingPhase:
         return np.where(np.isfinite(at.z), self.share(at.z), 0.0)
 
     @cached_property
-    def _knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The clock where the pieces begin, and at ``T_r``; ``psi`` there; ``int gain psi dt`` from there on."""
-        clock = self.protocol.clock_while_reaching(np.append(self.pieces, np.inf))
+    def _clock(self) -> np.ndarray:
+        """The clock where the pieces begin, and at ``T_r``."""
+        return self.protocol.clock_while_reaching(np.append(self.pieces, np.inf))
+
+    @cached_property
+    def shares(self) -> np.ndarray:
+        """``psi`` where the pieces begin, and 0 at ``T_r``."""
         share = np.append(self.share(self.pieces), 0.0)
         if self._quiet <= LAST_Z:  # the last piece begins when all are 0
             share[-2] = 0.0
-        later = np.append(np.cumsum((share[:-1] * np.diff(clock))[::-1])[::-1], 0.0) * _SLACK
-        return clock, share, later
+        return share
+
+    def sizes(self, z: np.ndarray) -> np.ndarray:
+        """Return the (N, M) bounds of ``|sigma_k|`` at instants ``z``, 0 from ``T_r`` on."""
+        key = z.shape, z.tobytes()
+        if key not in self._sizes:
+            if len(self._sizes) >= _KEPT:
+                self._sizes.clear()
+            moving = np.isfinite(z)
+            instants, same = np.unique(z[moving], return_inverse=True)
+            result = np.zeros((len(self.sigma0), *z.shape))
+            result[:, moving] = sliding_bound(self.protocol, self.sigma0, instants, self.reaching)[:, same]
+            self._sizes[key] = result
+        return self._sizes[key]
+
+    @cached_property
+    def _sizes(self) -> dict[tuple[tuple[int, ...], bytes], np.ndarray]:
+        return {}
+
+    def norm(self, z: np.ndarray) -> np.ndarray:
+        """Return Proposition 1's bound of ``||sigma||``, ``e^(-clock) ||sigma(0)||``, at instants ``z``."""
+        decay = np.exp(-self.protocol.reaching_gain.clock_at_tau(clock_values(z, "z")))
+        return np.asarray(math.hypot(*(float(x) for x in self.sigma0)) * decay)
 
     def rest(self, at: Instants) -> np.ndarray:
         """Return ``int gain psi`` from the instants on, from above."""
-        clock, share, later = self._knots
-        place, s = self._place(at), np.minimum(at.clock, clock[-1])
-        beyond = np.append(clock[1:], clock[-1])[place]
-        return share[place] * np.maximum(beyond - s, 0.0) * _SLACK + np.append(later[1:], 0.0)[place]
+        share = self.shares
+        later = np.append(np.cumsum((share[:-1] * np.diff(self._clock))[::-1])[::-1], 0.0) * _SLACK
+        place, clock = self._place(at)
+        beyond = np.append(self._clock[1:], self._clock[-1])[place]
+        return share[place] * np.maximum(beyond - clock, 0.0) * _SLACK + np.append(later[1:], 0.0)[place]
 
-    def driven(self, half: float, root: float, c: float, at: Instants) -> np.ndarray:
-        """Bound ``v`` at the instants from ``v(0) = root``; ``half`` is half the rate."""
-        clock, share, _ = self._knots
-        decay, step = np.exp(-half * np.diff(clock)), -np.expm1(-half * np.diff(clock)) / half
-        v = np.empty(clock.size)
-        v[0] = root
-        for i in range(clock.size - 1):
-            v[i + 1] = decay[i] * v[i] + c * share[i] * step[i]
-        place = self._place(at)
-        passed = np.maximum(at.clock - clock[place], 0.0)
-        return (v[place] * np.exp(-half * passed) - c * share[place] * np.expm1(-half * passed) / half) * _SLACK
+    def driven(self, half: float, first: float, push: np.ndarray, at: Instants) -> np.ndarray:
+        """Bound ``v`` at the instants from ``v(0) = first``; ``half`` is half the rate.
 
-    def _place(self, at: Instants) -> np.ndarray:
-        """Return in which pieces instants lie; the last begins at ``T_r``."""
-        clock, _, _ = self._knots
-        return np.clip(np.searchsorted(clock, at.clock, side="right") - 1, 0, clock.size - 1)
+        ``push`` is that where each piece begins, and 0 at ``T_r``.
+        """
+        step = half * np.diff(self._clock)
+        pieces = zip(np.exp(-step).tolist(), (push[:-1] * (-np.expm1(-step) / half)).tolist(), strict=True)
+        v = np.array(list(accumulate(pieces, lambda v, piece: piece[0] * v + piece[1], initial=first)))
+        place, clock = self._place(at)
+        passed = half * np.maximum(clock - self._clock[place], 0.0)
+        return (v[place] * np.exp(-passed) - push[place] * np.expm1(-passed) / half) * _SLACK
+
+    def _place(self, at: Instants) -> tuple[np.ndarray, np.ndarray]:
+        """Return in which pieces instants lie, the last of which begins at ``T_r``, and the clock there."""
+        moving = np.isfinite(at.z)
+        place = np.where(moving, np.searchsorted(self.pieces, at.z, side="right") - 1, self.pieces.size)
+        return place, np.where(moving, self.protocol.clock_while_reaching(at.z), at.clock)

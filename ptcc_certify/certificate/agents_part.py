@@ -23,11 +23,11 @@ from ptcc_certify.bounds.agents.each_agent import (
 )
 from ptcc_certify.bounds.agents.halved_times import instant_values
 from ptcc_certify.bounds.agents.run_against_bounds import AgentsComparison, compare_agents
-from ptcc_certify.bounds.envelope import remaining_part
 from ptcc_certify.bounds.final_state.enclosed_ends import agents_ends
 from ptcc_certify.bounds.final_state.of_graph import Influence
 from ptcc_certify.bounds.float_conversion import numbers
 from ptcc_certify.bounds.input.tightest_bound import round_up
+from ptcc_certify.bounds.instants import remaining_part
 from ptcc_certify.certificate.agents_answer import AgentsAnswer, Residual, final_states, read, rows_of, use, written
 from ptcc_certify.certificate.cascade_part import prove_cascade, read_cascade
 from ptcc_certify.certificate.graph_proof import GraphProof

@@ -14,8 +14,8 @@ from ptcc_certify.bounds.agents.common_motion import LARGEST_DECAY, common_motio
 from ptcc_certify.bounds.agents.each_agent import States, root_product
 from ptcc_certify.bounds.agents.halved_times import Values, instant_roots
 from ptcc_certify.bounds.agents.run_against_bounds import AgentsComparison, compare_with_bounds
-from ptcc_certify.bounds.envelope import remaining_part
 from ptcc_certify.bounds.float_conversion import numbers
+from ptcc_certify.bounds.instants import remaining_part
 from ptcc_certify.certificate.agents_answer import AgentsAnswer, final_states, read, rows_of, use, written
 from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.checker.agent_cascade import CascadeSection, TrackedSection, input_is_bounded

@@ -13,18 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from ptcc_certify.bounds.deviation.component_deviations import FunctionOf, UndrivenPart
+from lmi.exact.decimal_rounding import float_up
+from ptcc_certify.bounds.deviation.component_bounds import ComponentBounds, FunctionOf, RestStates
 from ptcc_certify.bounds.deviation.heard import HeardRows
-from ptcc_certify.bounds.deviation.of_family import (
-    RestStates,
-    deviation_while_driven,
-    input_while_driven,
-    sliding_sizes,
-)
-from ptcc_certify.bounds.envelope import Instants, remaining_part
 from ptcc_certify.bounds.final_state.attracting_box import AttractingBox
 from ptcc_certify.bounds.final_state.kept_means import LeadingGroup, leading_groups
 from ptcc_certify.bounds.final_state.labelled_ends import FinalEnds
+from ptcc_certify.bounds.instants import Instants, remaining_part
 from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.certificate.constrained_switching.claims import (
     Claim,
@@ -411,16 +406,8 @@ class FamilyProof(Proof):
         self._require_state()
         at, gain = self._instants(remaining), self.protocol.gain.value_at_remaining(_row(remaining))
         bounds = np.full((self.family.n_nodes, at.clock.size), np.inf)
-        for part, functions, driven in self._driven_parts:
-            nodes = part.component.nodes
-            if nodes.size == 1:
-                bounds[nodes] = 0
-            elif driven is None:
-                bounds[nodes] = self._undriven(part, functions).input(at.clock, gain)
-            else:
-                for V in functions:
-                    own = input_while_driven(V, self._state(part), driven, self._phase, at, gain)
-                    bounds[nodes] = np.minimum(bounds[nodes], own)
+        for part, own in zip(self.parts, self._component_bounds, strict=True):
+            bounds[part.component.nodes] = own.input(at, gain)
         if self.sigma0 is None:
             return bounds
         added = [np.inf] * len(bounds) if self.sliding_peaks is None else list(map(nearest_float, self.sliding_peaks))
@@ -446,45 +433,41 @@ class FamilyProof(Proof):
 
     def _deviation(self, at: Instants) -> np.ndarray:
         bounds = np.full((self.family.n_nodes, at.clock.size), np.inf)
-        for part, functions, driven in self._driven_parts:
-            nodes, rest = part.component.nodes, part.rest_states
-            if driven is None:
-                bounds[nodes] = 0 if nodes.size == 1 else self._undriven(part, functions).deviation(at.clock)
-                continue
-            if nodes.size == 1:
-                bounds[nodes] = sliding_sizes(driven, self._phase, at)
-            for V in functions:
-                deviation = deviation_while_driven(V, rest, self._state(part), driven, self._phase, at)
-                if deviation is not None:
-                    bounds[nodes] = np.minimum(bounds[nodes], deviation)
+        for part, own in zip(self.parts, self._component_bounds, strict=True):
+            bounds[part.component.nodes] = own.deviation(at)
         return bounds
 
-    def _undriven(self, part: ComponentProof, functions: Sequence[ProvedFunction]) -> UndrivenPart:
-        """Return a component with its functions, those of parts that others follow included."""
+    @cached_property
+    def _component_bounds(self) -> tuple[ComponentBounds, ...]:
+        """The bounds over time of every component."""
+        return tuple(self._bounds_of(*one) for one in self._driven_parts)
+
+    def _bounds_of(
+        self, part: ComponentProof, functions: Sequence[ProvedFunction], driven: Drive | None
+    ) -> ComponentBounds:
+        """Return the bounds of a component; where nothing drives it by functions of parts that others follow, too."""
+        everybody = np.arange(part.component.nodes.size)
+        own = [FunctionOf(everybody, V, part.rest_states) for V in functions]
+        if driven is not None:
+            return ComponentBounds(own, self._state(part), drive=driven, phase=self._phase)
         rows = HeardRows.of(part.component.family)
         finals = (
             None if rows is None or self.final_state is None else tuple(self.final_state)
         )  # of large families they take long
         ends = [] if finals is None else [finals[v] for v in part.component.nodes.tolist()]
         known = [pair for pair in ends if pair is not None]
-        everybody = np.arange(part.component.nodes.size)
-        own = [FunctionOf(everybody, V, part.rest_states) for V in functions]
         for led in (led for V in functions if isinstance(V, FollowerFunction) for led in V.parts):
             own.append(FunctionOf(led.agents, led.function, _rest_states(led.function.quotient)))
-        return UndrivenPart(own, self._state(part), rows, known if len(known) == everybody.size else None)
+        return ComponentBounds(own, self._state(part), rows, known if len(known) == everybody.size else None)
 
     def norm_bound(self, V: Any, part: int, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
         """Bound ``sqrt(V(x - sigma))`` of a function of a part at instants ``1 - t/T``, from the initial state.
 
         Where no sliding variable moves it is ``e^(-rate s / 2) sqrt(V(0))``.
         """
-        at = self._instants(remaining)
-        half = float(V.rate) / 2
-        driven = self._drives[part]
-        root = nearest_float(V.root(self._state(self.parts[part]))) * (1 + 1e-12)
-        if driven is None:
-            return root * np.exp(-half * at.clock)
-        return self._phase.driven(half, root, nearest_float(driven.constant(V)), at)
+        own = self._component_bounds[part]
+        decay, unit = own.decay(FunctionOf(np.arange(len(own.x)), V, None))
+        return decay.times(float_up(unit), self._instants(remaining))
 
     def _require_state(self) -> None:
         if self.initial_state is None:
@@ -499,7 +482,7 @@ class FamilyProof(Proof):
     @cached_property
     def _phase(self) -> ReachingPhase:
         assert self.protocol.reaching is not None and self.reaching is not None
-        return ReachingPhase(self.protocol.reaching, self.reaching)
+        return ReachingPhase(self.protocol.reaching, self.reaching, self.sigma0 or ())
 
 
 def _rest_states(quotient: Quotient) -> RestStates:

@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ptcc_certify.bounds.agents.each_agent import error_constants
 from ptcc_certify.bounds.delay.case import DecayingForm
 from ptcc_certify.bounds.delay.late_messages import late_obligations
 from ptcc_certify.bounds.deviation.from_final_state import DeviationGeometry
@@ -22,7 +23,7 @@ from ptcc_certify.bounds.final_state.of_graph import FinalState, Influence, infl
 from ptcc_certify.bounds.input.effort import Effort
 from ptcc_certify.bounds.input.effort_bounds import InputRequest, bound_effort, full_constants
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
-from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
+from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.proof import Proof
 from ptcc_certify.checker import INPUT_NODES
@@ -268,11 +269,9 @@ class GraphProof(Proof):
     @cached_property
     def envelope(self) -> Envelope:
         """The proved bounds over time; without Lyapunov functions if nothing was proved."""
-        gain = self.protocol.gain
-        if (sliding := self.protocol.reaching) is not None:
-            sigma0, reaching = self.sigma0 or (), self.reaching or ()
-            return SlidingEnvelope(self.structure, gain, self.functions, sliding, sigma0, reaching)
-        return Envelope(self.structure, gain, self.functions)
+        sliding = self.protocol.reaching
+        phase = None if sliding is None else ReachingPhase(sliding, self.reaching or (), self.sigma0 or ())
+        return Envelope(self.structure, self.protocol.gain, self.functions, phase)
 
     @gated
     def norm_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
@@ -366,8 +365,7 @@ class GraphProof(Proof):
             if form is None or form.coordinates != "E" or V.deviation is None or not V.proved_rate > 0:
                 continue
             if form.diagonal is not None:
-                weight = dict(zip(form.nodes, form.diagonal, strict=True))
-                constants = tuple(1 / weight[v] if v in weight else Fraction(0) for v in range(self.graph.n_nodes))
+                constants = error_constants(self.structure, V)
             if constants is not None:
                 found.append(DecayingForm(k, form, constants, V.deviation.agents))
         return found

@@ -143,7 +143,8 @@ def input_range(proof: GraphProof) -> tuple[Fraction | float, Fraction | None]:
         degree = max(row.get(v, Fraction(0)) for v, row in enumerate(rows))
         least = max(least, 2 * degree * proof.noise * min(tops)) if tops else math.inf
     if proof.limits:
-        peaks = [e.largest if proof.noise is None else e.noisy_largest for e in effort.residual]
+        under = effort.residual if proof.noise is None else [e.noise for e in effort.residual]
+        peaks = [None if one is None else one.largest for one in under]
         most = None if len(peaks) < len(proof.limits) or None in peaks else max(x for x in peaks if x is not None)
     else:
         most = None if effort.peak is None or proof.noise is not None else effort.peak.largest

@@ -223,7 +223,7 @@ def _sliding_ratio(certificate: Certificate, run: Trajectory) -> float | None:
     if not (sliding.reaching_z <= certain * (1 + 1e-9)).all():
         return float("inf")
     with np.errstate(divide="ignore"):
-        share = ReachingPhase(protocol, reaching).share(-np.log(sliding.reaching_remaining))
+        share = ReachingPhase(protocol, reaching, certificate.sigma0 or ()).share(-np.log(sliding.reaching_remaining))
     return _worst(np.abs(sliding.sigma), np.multiply.outer(np.abs(sliding.sigma0), share))
 
 

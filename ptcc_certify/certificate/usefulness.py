@@ -173,7 +173,7 @@ def _limited_usefulness(proof: GraphProof) -> tuple[bool, str]:
         worst = max(x for entry in residual for x in entry.agents or ())
         if worst <= Fraction(USEFUL) * Fraction(way):
             return True, f"under the limits every agent within {up(worst, 2)} of its final state at T"
-    norm = max(entry.norm if entry.noisy_norm is None else entry.noisy_norm for entry in residual)
+    norm = max(entry.norm if entry.noise is None else entry.noise.norm for entry in residual)
     under = f"under the limits{' and noise' if noisy else ''} ||E||"
     remark = f"{under} <= {up(norm, 2)} at T"
     rows = proof.structure.graph.exact_rows(range(proof.structure.graph.n_nodes))

@@ -8,15 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from lmi.exact.decimal_rounding import near
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.declared_option import option
 from ptcc_certify.model.parameters import Given, NotNegative, Parameters
-
-if TYPE_CHECKING:
-    pass
 
 
 @gated

@@ -216,13 +216,12 @@ def asked(tmp_path_factory) -> dict[str, Callable[[object], object]]:
         "remaining of a saved norm": saved.norm_bound,
         "remaining of a saved distance": saved.deviation_bound,
         "remaining of sliding norm_bound": lambda q: slid.envelope.norm_bound(q, x0),
-        "remaining of sliding state_bound": lambda q: slid.envelope.state_bound(q, x0),
         "remaining of sliding outcome_distance": lambda q: slid.envelope.deviation_bound(q, x0),
         "clock of norm_factor": cert.envelope.norm_factor,
         "clock of bound": lambda s: cert.envelope.bound(s, x0),
         "clock of distance": lambda s: cert.envelope.deviation(s, x0),
         "clock of distance_norm": lambda s: cert.envelope.deviation_norm(s, x0),
-        "z of sliding_norm": slid.envelope.sliding_norm,
+        "z of sliding_norm": slid.envelope.phase.norm,
     }
 
 

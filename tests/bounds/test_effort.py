@@ -795,7 +795,7 @@ def test_noise_under_a_limit_leaves_no_more_than_is_proved(name: str, actuator: 
     )
     assert cert.verdict == "certified" and cert.effort is not None
     (entry,) = cert.effort.residual
-    assert entry.noisy_norm is not None and entry.noisy_largest is not None
+    assert entry.noise is not None
     L = graph.dense_laplacian()
     for text in ("0.05*sin(40*t+k)", "0.05*sign(sin(7*t*k))", "0.05"):
         run = simulate(graph, protocol, x0, actuator=actuator, noise=Bounded(text, "1/20"), past=0, remaining=1e-6)
@@ -805,8 +805,8 @@ def test_noise_under_a_limit_leaves_no_more_than_is_proved(name: str, actuator: 
         gain = actuator.limit(protocol.gain).value(run.t)
         assert np.abs(n).max() <= nu + 1e-12
         u = gain * (run.error - L @ n)
-        assert np.abs(u[:, before]).max() <= float(entry.noisy_largest) * (1 + 1e-9)
-        assert np.linalg.norm(run.error[:, before][:, -1]) <= float(entry.noisy_norm) * (1 + 1e-9)
+        assert np.abs(u[:, before]).max() <= float(entry.noise.largest) * (1 + 1e-9)
+        assert np.linalg.norm(run.error[:, before][:, -1]) <= float(entry.noise.norm) * (1 + 1e-9)
 
 
 def test_noise_times_an_infinite_gain_is_not_certified():

@@ -19,15 +19,12 @@ from row_families import (
 )
 from scipy.linalg import expm
 
-import ptcc_certify.bounds.final_state.of_family as module
+import ptcc_certify.bounds.final_state.constant_weights as module
 from ptcc_certify.bounds.final_state.attracting_box import attracting_box, invariant_intervals
-from ptcc_certify.bounds.final_state.of_family import final_value, value_ends, weighted_mean_interval
+from ptcc_certify.bounds.final_state.constant_weights import value_ends
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.lyapunov.common_form_search import search_common_forms
-from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.row_decay import follower_decay
-from ptcc_certify.theorems.family_behaviour import decide
 
 # ---------------------------------------------------------------------- constant weights
 
@@ -36,9 +33,9 @@ def compare_with_vertices(seed: int) -> None:
     rng = random.Random(seed)
     family = random_consensus(rng)
     x = random_state(rng, family.n_nodes)
-    value = final_value(family.modes[0], x)
-    values = values_of_vertices(family.modes[0], [int(g) * v for g, v in zip(value.camps, x, strict=True)])
-    assert value.exact and (value.lower, value.upper) == (min(values), max(values))
+    ends = value_ends(family.modes[0], x)
+    values = values_of_vertices(family.modes[0], [g * v for g, v in zip(ends.camps, x, strict=True)])
+    assert ends.within == 0 and (ends.lower, ends.upper) == (min(values), max(values))
 
 
 @pytest.mark.few(8)
@@ -60,11 +57,11 @@ def test_final_values_of_large_groups_enclose_the_vertices_closely(seed, monkeyp
     rng = random.Random(seed)
     family = random_consensus(rng)
     x = random_state(rng, family.n_nodes)
-    value = final_value(family.modes[0], x)
-    values = values_of_vertices(family.modes[0], [int(g) * v for g, v in zip(value.camps, x, strict=True)])
+    ends = value_ends(family.modes[0], x)
+    values = values_of_vertices(family.modes[0], [g * v for g, v in zip(ends.camps, x, strict=True)])
     low, high = min(values), max(values)
-    assert value.lower <= low <= value.reached_lower and value.reached_upper <= high <= value.upper
-    assert max(value.reached_lower - value.lower, value.upper - value.reached_upper) < 1e-6
+    assert ends.lower <= low <= ends.lower + ends.within and ends.upper - ends.within <= high <= ends.upper
+    assert max(low - ends.lower, ends.upper - high) < 1e-6
 
 
 def test_followers_have_no_say_and_camps_turn_the_interval():
@@ -76,16 +73,16 @@ def test_followers_have_no_say_and_camps_turn_the_interval():
 def test_undirected_edges_keep_the_mean_where_directions_apart_would_not():
     edges = [("a", "b", 1, 9)]
     x = [Fraction(0), Fraction(1)]
-    tied = final_value(Family.from_intervals(edges, undirected=True).modes[0], x)
-    apart = final_value(Family.from_intervals([*edges, ("b", "a", 1, 9)]).modes[0], x)
-    assert tied.exact and tied.lower == tied.upper == Fraction(1, 2)
+    tied = value_ends(Family.from_intervals(edges, undirected=True).modes[0], x)
+    apart = value_ends(Family.from_intervals([*edges, ("b", "a", 1, 9)]).modes[0], x)
+    assert tied.within == 0 and tied.lower == tied.upper == Fraction(1, 2)
     assert (apart.lower, apart.upper) == (Fraction(1, 10), Fraction(9, 10))
 
 
 def test_weights_that_change_leave_the_interval_of_constant_ones():
     """By a quarter of its length: agent 1 first listens as much as it can, then agent 2 listens to agent 1."""
     family = Family.from_intervals([(0, 1, 1, 2), (1, 2, 1, 2), (2, 0, 1, 2), (2, 1, 1, 2)])
-    value = final_value(family.modes[0], [Fraction(2), Fraction(-1), Fraction(1)])
+    value = value_ends(family.modes[0], [Fraction(2), Fraction(-1), Fraction(1)])
     assert (value.lower, value.upper) == (Fraction(2, 5), 1)
     first, then = (np.array([[1, 0, -1], [-2, d, 2 - d], [0, -w, w]]) for d, w in ((4, 1), (3, 2)))
     X = expm(-100.0 * then) @ expm(-0.4 * first) @ [2, -1, 1]
@@ -98,42 +95,7 @@ def test_weights_that_change_leave_the_interval_of_constant_ones():
 def test_a_mode_without_consensus_has_no_final_value(edges):
     family = Family.from_intervals(edges)
     with pytest.raises(HypothesisError):
-        final_value(family.modes[0], [Fraction(1)] * family.n_nodes)
-
-
-# ---------------------------------------------------------------------- every signal
-
-
-def test_weighted_means_enclose_the_values_of_random_signals():
-    rng, widths = random.Random(5), []
-    for _ in range(8):
-        family = random_consensus(rng)
-        (component,) = decide(family)
-        quotient = Quotient.of(component)
-        functions = search_common_forms(quotient, kinds=("undirected", "diagonal")).functions if quotient.nodes else ()
-        if not functions or functions[0].rate <= 0:
-            continue
-        x = random_state(rng, family.n_nodes)
-        low, high = weighted_mean_interval(quotient, functions[0], component.gauge.tolist(), x)
-        X = np.array([float(v) for v in x])
-        for _ in range(60):
-            X = expm(-0.2 * laplacian(family.modes[0], random_vertex(rng, family.modes[0]))) @ X
-        step = expm(-laplacian(family.modes[0], random_vertex(rng, family.modes[0])))
-        X = np.linalg.matrix_power(step, 10_000) @ X  # old SciPy has no exponential of so large a matrix
-        assert float(low) - 1e-6 <= component.gauge[0] * X[0] <= float(high) + 1e-6
-        widths.append(high - low)
-    assert len(widths) > 2
-
-
-def test_the_mean_of_undirected_graphs_is_exact_for_every_signal():
-    family = Family.from_intervals([("a", "b", 1, 5), ("b", "c", 0, 5), ("a", "c", 1, 2)], undirected=True)
-    quotient = Quotient.of(decide(family)[0])
-    function = search_common_forms(quotient).functions[0]
-    third = Fraction(1, 3)
-    x = [Fraction(1), Fraction(2), Fraction(6)]
-    assert weighted_mean_interval(quotient, function, (1, 1, 1), x, (third,) * 3) == (Fraction(3), Fraction(3))
-    with pytest.raises(HypothesisError, match="sum"):
-        weighted_mean_interval(quotient, function, (1, 1, 1), x, (third,) * 2 + (Fraction(0),))
+        value_ends(family.modes[0], [Fraction(1)] * family.n_nodes)
 
 
 # ---------------------------------------------------------------------- boxes

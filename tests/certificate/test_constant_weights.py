@@ -16,7 +16,7 @@ from row_families import random_consensus, random_state, values_of_vertices
 
 from lmi import search_time
 from ptcc_certify import Family, NominalProtocol, SlidingModeProtocol
-from ptcc_certify.bounds.final_state.of_family import value_ends
+from ptcc_certify.bounds.final_state.constant_weights import value_ends
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.constrained_switching.claims import FinalValueClaim
 from ptcc_certify.certificate.constrained_switching.final_states import constant_states
@@ -73,7 +73,7 @@ def test_the_ends_that_are_certified_are_those_of_all_vertices_of_more_graphs(st
 
 @pytest.mark.parametrize("seed", range(4))
 def test_long_numbers_are_rounded_outwards_and_some_weights_come_as_near_as_is_said(seed: int, monkeypatch: Any):
-    monkeypatch.setattr("ptcc_certify.bounds.final_state.of_family._SHORT", 8)
+    monkeypatch.setattr("ptcc_certify.bounds.final_state.constant_weights._SHORT", 8)
     rng = random.Random(seed)
     family = random_consensus(rng)
     x = random_state(rng, family.n_nodes)

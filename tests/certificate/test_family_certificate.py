@@ -83,7 +83,8 @@ def test_bounds_beyond_all_floats_are_infinite():
     assert made.verdict == "certified" and made.parts[0].rate > size
     instants = np.array([0.0, 1e-3, 1.0])  # of 1 - t/T
     bound = made.input_bound(instants)
-    assert np.isinf(bound[:, [0, -1]]).all() and not bound[:, 1].any()  # where nothing is left nobody moves
+    assert np.isinf(bound[:, [0, -1]]).all()
+    assert 0 < bound[:, 1].max() < 1e-19  # of 5e-324, above what is left
     assert made.deviation_bound(instants)[:, -1].max() < 1e301
 
 

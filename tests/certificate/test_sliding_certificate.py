@@ -18,7 +18,6 @@ from generators import all_classes, class_cases, random_graph
 from selection import thinned
 
 from ptcc_certify.bounds.final_state.of_graph import final_state
-from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker import SLIDING_BOUND, SLIDING_CLOCK, digest
@@ -264,20 +263,20 @@ def test_what_belongs_to_the_sliding_mode_is_refused_elsewhere():
 
 def test_the_bound_cannot_be_asked_as_a_multiple_of_the_start_while_sigma_drives():
     envelope = example("4", "fig1a").envelope
-    assert isinstance(envelope, SlidingEnvelope) and not envelope.direct
-    with pytest.raises(ParameterError, match="state_bound"):
+    assert not envelope.direct
+    with pytest.raises(ParameterError, match="norm_bound"):
         envelope.residual(0.1)
-    with pytest.raises(ParameterError, match="state_bound"):
+    with pytest.raises(ParameterError, match="norm_bound"):
         envelope.bound(1.0, np.ones(6))
 
 
 @pytest.mark.parametrize(("number", "name"), RUNS)
 def test_the_bound_of_the_state_holds_along_the_run_and_falls_after_T_r(number: str, name: str):
     cert, run = example(number, name), sliding_run(example(number, name))
-    assert isinstance(cert.envelope, SlidingEnvelope) and cert.initial_state is not None and cert.lyapunov is not None
+    assert cert.envelope.phase is not None and cert.initial_state is not None and cert.lyapunov is not None
     x0 = np.array([float(x) for x in cert.initial_state])
     before = run.remaining > 1e-7
-    bound = cert.envelope.state_bound(run.remaining[before], x0)
+    bound = cert.envelope.norm_bound(run.remaining[before], x0)
     function = cert.envelope.functions[0]
     z = function.coordinates_of(run.states[:, before], cert.graph.laplacian())
     assert (np.linalg.norm(z, axis=0) <= bound * (1 + 1e-9) + 1e-6).all()
@@ -302,10 +301,11 @@ def test_a_reaching_time_or_a_bound_of_sigma_that_is_missed_is_seen():
 
     cert = example("4", "fig1a")
     run, envelope = sliding_run(cert), cert.envelope
-    assert isinstance(envelope, SlidingEnvelope)
-    early = tuple(replace(r, z=r.z / 2) for r in envelope.reaching if r.z is not None)
-    assert replace(envelope, reaching=early).compare(run).reaching_kept is False
-    assert replace(envelope, reaching=early).compare(run).violated
+    assert envelope.phase is not None
+    early = tuple(replace(r, z=r.z / 2) for r in envelope.phase.reaching if r.z is not None)
+    hasty = replace(envelope, phase=replace(envelope.phase, reaching=early))
+    assert hasty.compare(run).reaching_kept is False
+    assert hasty.compare(run).violated
     swollen = replace(run, sliding=replace(run.sliding, sigma=run.sliding.sigma * 1.5))
     assert envelope.compare(swollen).sliding_ratio == pytest.approx(1.5, rel=1e-3)
 

@@ -18,8 +18,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-import flint
-
 from lmi.exact.elementary_enclosures import log
 from ptcc_certify.bounds.agents.common_motion import Interval
 from ptcc_certify.bounds.final_state.of_graph import Influence, influence
@@ -28,6 +26,7 @@ from ptcc_certify.graphs.io import as_graph, as_states
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.model.gain import Gain
+from ptcc_certify.theorems.lemmas import solve_exact
 
 #: Agents at most: the places of more are not solved for exactly.
 MOST_NODES = 400
@@ -181,14 +180,10 @@ def _places(who: Influence, biases: Sequence[Fraction]) -> list[Fraction]:
     nodes = [v for v in range(graph.n_nodes) if v not in first]
     places = [Fraction(0)] * graph.n_nodes
     if nodes:
-        rows = graph.exact_rows(nodes)
-        L = flint.fmpq_mat(len(nodes), len(nodes), [_fmpq(row.get(v, Fraction(0))) for row in rows for v in nodes])
-        solution = L.solve(flint.fmpq_mat(len(nodes), 1, [_fmpq(biases[v]) for v in nodes]))
-        for i, v in enumerate(nodes):
-            places[v] = Fraction(int(solution[i, 0].p), int(solution[i, 0].q))
+        L = [[row.get(v, Fraction(0)) for v in nodes] for row in graph.exact_rows(nodes)]
+        solution = solve_exact(L, [[biases[v]] for v in nodes])
+        assert solution is not None, "without one agent of each group L is not singular"
+        for v, (place,) in zip(nodes, solution, strict=True):
+            places[v] = place
     kept, _ = who.apply(places)
     return [h - Fraction(x) for h, x in zip(places, kept, strict=True)]
-
-
-def _fmpq(x: Fraction) -> flint.fmpq:
-    return flint.fmpq(x.numerator, x.denominator)

@@ -10,8 +10,11 @@ from functools import cached_property
 
 import numpy as np
 
+from lmi.exact.decimal_rounding import float_down
 from lmi.exact.elementary_enclosures import rounded
+from ptcc_certify.bounds.decay import Decay
 from ptcc_certify.bounds.final_state.of_graph import Influence
+from ptcc_certify.bounds.instants import Instants
 from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above, gain_above
 from ptcc_certify.checker.lyapunov_form import Form
 from ptcc_certify.checker.message_ages import PARTS, Messages, Moving
@@ -198,6 +201,10 @@ class LateCase:
         """Bound ``e^(-b s(T))`` of this integral from above."""
         clock = self.clock(cap)
         return Fraction(0) if clock is None else left_above(b * clock)
+
+    def decay(self, b: Fraction, t: np.ndarray, cap: Fraction | None = None) -> np.ndarray:
+        """Bound ``e^(-b s)`` of the same integral at instants, (M,) floats from above."""
+        return Decay(2 * float_down(b), 1.0).times(1.0, Instants(np.asarray(self.limited(cap).clock(t))))
 
     def highest(self, b: Fraction, cap: Fraction | None = None) -> Fraction:
         """Bound ``sup_t g e^(-b s)`` from above, ``g`` the gain that acts, which has a cap."""

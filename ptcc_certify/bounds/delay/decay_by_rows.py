@@ -92,7 +92,7 @@ class RowBound:
             grown = -np.expm1(-rate * np.maximum(t - T, 0))
             later = before[-1] * (1 - grown) + push / rate * grown
             added = np.where(t > T, np.minimum(later, float(self.after or 0)), before[:-1])
-        return np.exp(-b * case.limited(self.cap).clock(t)), added
+        return case.decay(self.witness.b, t, self.cap), added
 
     def deviation_bound(self, case: LateCase, t: np.ndarray) -> np.ndarray:
         """Return what bounds ``|x_k - x_k*|`` of followers at instants, ``(F, M)`` floats."""

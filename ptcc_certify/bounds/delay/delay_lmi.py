@@ -74,8 +74,7 @@ class DelayLMIBound:
     def deviation_bound(self, case: LateCase, t: np.ndarray) -> np.ndarray:
         """Return what bounds ``|x_k - (Q X(0))_k|`` at instants, ``(N, M)`` floats."""
         moved, away = (np.array([[float_up(x)] for x in values]) for values in (self.moved, self.away))
-        bound: np.ndarray = (moved + away * np.exp(-float(self.b) * case.limited().clock(t))) * float(_MORE)
-        return bound
+        return np.asarray((moved + away * case.decay(self.b, t)) * float(_MORE))
 
 
 class DelayLMIBounds:

@@ -60,7 +60,7 @@ class Settling:
     def deviation_bound(self, case: LateCase, t: np.ndarray) -> np.ndarray:
         """Return what bounds ``|x_k - x_k*|`` at instants, ``(N, M)`` floats."""
         u = np.array([float_up(x) for x in self.u])
-        return np.asarray(u[:, None] * np.exp(-float(self.b) * case.limited(self.cap).clock(t)) * (1 + _MORE))
+        return np.asarray(u[:, None] * case.decay(self.b, t, self.cap) * (1 + _MORE))
 
 
 class SettlingBounds:

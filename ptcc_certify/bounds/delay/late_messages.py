@@ -28,8 +28,8 @@ from ptcc_certify.bounds.delay.delay_lmi import DelayLMIBound
 from ptcc_certify.bounds.delay.followers_of_groups import Settling
 from ptcc_certify.bounds.delay.small_delays import SmallDelays
 from ptcc_certify.bounds.delay.staged_deadlines import stage_deadlines
-from ptcc_certify.bounds.envelope import instants_from_0
 from ptcc_certify.bounds.float_conversion import floats, floats_up
+from ptcc_certify.bounds.instants import instants_from_0
 from ptcc_certify.bounds.virtual_positions import VehicleBounds, bound_vehicles, read_vehicles, vehicles_section
 from ptcc_certify.checker.delay_lmi import LateLMIWitness
 from ptcc_certify.checker.delayed_forms import LateFormWitness, SettlingWitness

@@ -20,7 +20,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from ptcc_certify.bounds.final_state.of_family import middle_left_vector
+from ptcc_certify.bounds.final_state.constant_weights import middle_left_vector
 from ptcc_certify.checker.common_kernel_ends import agents_heard
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family

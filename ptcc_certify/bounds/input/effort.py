@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 from lmi.exact.decimal_rounding import up
-from ptcc_certify.bounds.float_conversion import fractions, numbers
+from ptcc_certify.bounds.float_conversion import fractions
 from ptcc_certify.checker import INPUT_NODES
 from ptcc_certify.checker.input import (
     Box,
@@ -17,18 +18,23 @@ from ptcc_certify.checker.input import (
     EnergyWitness,
     InputSection,
     LimitedSection,
-    NoiseSection,
     PeakSection,
     PeakWitness,
-    Threshold,
 )
 from ptcc_certify.checker.input_formulas import InitialSet, Limits, Rows
 from ptcc_certify.checker.obligations import CheckReport
-from ptcc_certify.checker.protocol import SlidingPart as SlidingSection
+from ptcc_certify.checker.section_declarations import declared
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.model.base import Protocol
 from ptcc_certify.theorems.theorem import Obligation
+
+
+class Threshold(NamedTuple):
+    """Proved bounds of ``rho2 kappa min Re lambda``, or None; the input is bounded from 1 on."""
+
+    lower: Fraction | None
+    upper: Fraction | None
 
 
 @dataclass(frozen=True)
@@ -81,11 +87,20 @@ class SlidingPart:
 
 
 @dataclass(frozen=True)
+class Noise:
+    """Measurement noise ``|n_k| <= bound``, ``u = -gain L (X + n)``: ``||E||`` at the deadline, and every ``|u_k|``."""
+
+    bound: Fraction
+    function: int
+    norm: Fraction
+    largest: Fraction
+
+
+@dataclass(frozen=True)
 class Limited:
     """What is left at the deadline under limits of the gain: ``||E||``, and the deviation of each agent.
 
-    ``largest`` bounds ``max_k |u_k|``; None under a zero-order hold. With measurement noise ``|n_k| <= noise``,
-    ``u = -gain L (X + n)``, ``noisy_norm`` bounds ``||E||`` at the deadline and ``noisy_largest`` every ``|u_k|``.
+    ``largest`` bounds ``max_k |u_k|``; None under a zero-order hold.
     """
 
     limits: Limits
@@ -95,10 +110,7 @@ class Limited:
     norm: Fraction
     agents: tuple[Fraction, ...] | None
     largest: Fraction | None
-    noise: Fraction | None = None
-    noise_function: int | None = None
-    noisy_norm: Fraction | None = None
-    noisy_largest: Fraction | None = None
+    noise: Noise | None = None
 
 
 @dataclass(frozen=True)
@@ -122,8 +134,7 @@ class Effort:
         initial state; None: undecided.
     by : {"rate", "upper_bound", "spectrum"} or None
         What decides it: a proved rate, a proved upper bound on the decay rate, or the exact location of the spectrum.
-    threshold : pair of Fraction or None
-        Proved bounds of ``rho2 kappa min Re lambda``; the input is bounded from 1 on.
+    threshold : Threshold
     initial_set : InitialSet or None
         The set of initial states that the bounds are for; None: the initial state of the certificate.
     constants : tuple of (tuple of Fraction or None)
@@ -168,7 +179,7 @@ class Effort:
 
     bounded: bool | None
     by: str | None
-    threshold: tuple[Fraction | None, Fraction | None]
+    threshold: Threshold
     initial_set: InitialSet | None
     constants: tuple[tuple[Fraction, ...] | None, ...]
     peak: Peak | None = None
@@ -200,7 +211,7 @@ class Effort:
             elif bound is not None:
                 result.append(Obligation(kind, "input", {"z": bound.z}, bound.function))
         for k, entry in enumerate(self.residual):
-            witness = entry.function if entry.noise_function is None else [entry.function, entry.noise_function]
+            witness = entry.function if entry.noise is None else [entry.function, entry.noise.function]
             result.append(Obligation("limited-gain", f"input.residual[{k}]", {"growth": entry.growth}, witness))
         if self.disturbed is not None:
             numbers = {"delta": self.disturbed.delta}
@@ -218,44 +229,15 @@ def effort_section(effort: Effort | None, n: int) -> InputSection | None:
     """Return the section ``input`` of a certificate of ``n`` agents."""
     if effort is None:
         return None
-    energy, length, peak, disturbed = effort.energy, effort.path_length, effort.peak, effort.disturbed
-    sliding = effort.sliding
-    return InputSection(
-        bounded=effort.bounded,
-        threshold=Threshold(lower=effort.threshold[0], upper=effort.threshold[1]),
-        initial_set=None if effort.initial_set is None else _region(effort.initial_set, n),
-        constants=list(map(numbers, effort.constants)),
-        peak=None if peak is None else PeakSection(agents=Numbers(peak.agents), largest=peak.largest, norm=peak.norm),
-        energy=None if energy is None else energy.value,
-        path_length=None if length is None else length.value,
-        sliding=None if sliding is None else SlidingSection(bounded=sliding.bounded, agents=numbers(sliding.agents)),
-        residual=list(map(_limited, effort.residual)),
-        disturbed=None
-        if disturbed is None
-        else DisturbedSection(delta=disturbed.delta, inputs=Numbers(disturbed.inputs), drift=numbers(disturbed.drift)),
-    )
-
-
-def _region(states: InitialSet, n: int) -> Box | Ellipsoid:
-    center = Numbers(states.center)
-    if states.axes:
-        return Ellipsoid(center=center, axes=list(map(Numbers, states.axes)))
-    return Box(center=center, radius=Numbers(states.radius or (Fraction(0),) * n))
-
-
-def _limited(entry: Limited) -> LimitedSection:
-    noise = None
-    bound, norm, largest = entry.noise, entry.noisy_norm, entry.noisy_largest
-    if bound is not None and norm is not None and largest is not None:
-        noise = NoiseSection(bound=bound, norm=norm, largest=largest)
-    return LimitedSection(
-        **{key: getattr(entry.limits, key) for key in LIMITS},
-        clock=entry.clock,
-        norm=entry.norm,
-        agents=numbers(entry.agents),
-        largest=entry.largest,
-        noise=noise,
-    )
+    stated: dict[str, Any] = {f.name: getattr(effort, f.name) for f in declared(InputSection)}
+    for name in ("energy", "path_length"):
+        stated[name] = None if stated[name] is None else stated[name].value
+    stated["residual"] = [SimpleNamespace(**vars(entry), **vars(entry.limits)) for entry in effort.residual]
+    if (states := effort.initial_set) is not None and states.axes:
+        stated["initial_set"] = Ellipsoid(center=Numbers(states.center), axes=list(map(Numbers, states.axes)))
+    elif states is not None and not states.radius:
+        stated["initial_set"] = replace(states, radius=(Fraction(0),) * n)
+    return InputSection(**stated)
 
 
 def peak_witness(peak: Peak) -> PeakWitness:
@@ -280,7 +262,7 @@ def read_effort(
     return Effort(
         bounded=section.bounded,
         by=None if section.bounded is None else proved["input-threshold", "input"]["witness"],
-        threshold=(section.threshold.lower, section.threshold.upper),
+        threshold=Threshold(section.threshold.lower, section.threshold.upper),
         initial_set=initial_set,
         constants=tuple(map(fractions, section.constants)),
         peak=None if section.peak is None else _read_peak(section.peak, proved["input-peak", "input"]),
@@ -291,16 +273,13 @@ def read_effort(
             _read_limited(entry, proved["limited-gain", f"input.residual[{k}]"])
             for k, entry in enumerate(section.residual)
         ),
-        disturbed=None
-        if disturbed is None
-        else Disturbed(
-            disturbed.delta,
-            proved["nominal-disturbed", "input"]["witness"],
-            tuple(disturbed.inputs),
-            fractions(disturbed.drift),
-        ),
+        disturbed=None if disturbed is None else _read_disturbed(disturbed, proved["nominal-disturbed", "input"]),
         first=None if states is None else first_input(structure, protocol, states),
     )
+
+
+def _read_disturbed(section: DisturbedSection, step: Step) -> Disturbed:
+    return Disturbed(section.delta, step["witness"], tuple(section.inputs), fractions(section.drift))
 
 
 def _read_witness(bound: Fraction | None, step: Step | None) -> Witness | None:
@@ -330,10 +309,7 @@ def _read_limited(section: LimitedSection, step: Step) -> Limited:
         norm=section.norm,
         agents=fractions(section.agents),
         largest=section.largest,
-        noise=None if noise is None else noise.bound,
-        noise_function=None if noise is None else used[1],
-        noisy_norm=None if noise is None else noise.norm,
-        noisy_largest=None if noise is None else noise.largest,
+        noise=None if noise is None else Noise(noise.bound, used[1], noise.norm, noise.largest),
     )
 
 

@@ -23,6 +23,7 @@ from ptcc_certify.bounds.input.effort import (
     Effort,
     Peak,
     SlidingPart,
+    Threshold,
     first_input,
 )
 from ptcc_certify.bounds.input.energy import energy_integral
@@ -41,6 +42,7 @@ from ptcc_certify.checker.input_formulas import (
     peak_above,
     root_above,
 )
+from ptcc_certify.checker.protocol import last_time, sliding_bounded, sliding_part
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.model import Protocol
 
@@ -102,7 +104,7 @@ def bound_effort(request: InputRequest) -> Effort:
     bounded, by = _decide_boundedness(structure, gain.pole, *request.rates, still)
     lower, upper = (None if r is None else gain.pole * r / 2 for r in request.rates)
     sliding = _sliding_part(request)
-    effort = Effort(bounded, by, (lower, upper), None, (None,) * len(request.forms), sliding=sliding)
+    effort = Effort(bounded, by, Threshold(lower, upper), None, (None,) * len(request.forms), sliding=sliding)
     if (request.initial_state is None and request.initial_set is None) or still or n > INPUT_NODES:
         return effort
     constants = tuple(None if c is None else tuple(c) for c in request.constants)
@@ -158,10 +160,8 @@ def _sliding_part(request: InputRequest) -> SlidingPart | None:
     protocol, sigma0 = request.protocol.reaching, request.sigma0
     if protocol is None or sigma0 is None:
         return None
-    drive = protocol.reaching_gain
-    if drive.pole < 1 and any(sigma0):
-        return SlidingPart(False, None)
-    return SlidingPart(drive.pole >= 1, tuple(protocol.mu1 + drive.first * abs(s) for s in sigma0))
+    own = sliding_part(protocol.parameters, sigma0)
+    return SlidingPart(sliding_bounded(protocol.parameters), None if own is None else tuple(own))
 
 
 def _reaching_phase(request: InputRequest) -> Reaching | None:
@@ -169,9 +169,8 @@ def _reaching_phase(request: InputRequest) -> Reaching | None:
     protocol, sigma0, times = request.protocol.reaching, request.sigma0, request.reaching
     if protocol is None or sigma0 is None or not any(sigma0):
         return None
-    last = [None] if times is None else [z for z, s in zip(times, sigma0, strict=True) if s]
     drive, push = protocol.reaching_gain, protocol.mu1 + protocol.delta
-    quiet = None if None in last else max(z for z in last if z is not None)
+    quiet = None if times is None else last_time(times, sigma0)
     return Reaching(sigma0, protocol.T_r, protocol.T_s, drive.rho1, drive.pole, push, quiet)
 
 

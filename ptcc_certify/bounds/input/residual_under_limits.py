@@ -12,7 +12,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from ptcc_certify.bounds.final_state.of_graph import Influence
-from ptcc_certify.bounds.input.effort import Disturbed, Limited, Peak
+from ptcc_certify.bounds.input.effort import Disturbed, Limited, Noise, Peak
 from ptcc_certify.bounds.input.tightest_bound import BOUND_BITS, decaying, least, log, round_up
 from ptcc_certify.checker.input_formulas import LAST_PERIODS, InputBounds, Limits, root_above, rounded
 from ptcc_certify.graphs.rationals import nearest_float
@@ -70,10 +70,8 @@ class LimitedBounds:
             best = replace(best, agents=self._least_deviations(limits, clock))
         if best is None or self.noise is None or limits.sample_period is not None:
             return best
-        noisy = least(
-            (partial(self._add_noise, k, best, top) for k in self.functions), lambda entry: entry.noisy_largest
-        )
-        return noisy or best
+        noise = least((partial(self._noise, k, best, top) for k in self.functions), lambda noise: noise.largest)
+        return replace(best, noise=noise)
 
     def _of(self, limits: Limits) -> tuple[Fraction, Fraction]:
         """Return the largest gain, and the clock that is left, short of what other roundings find."""
@@ -105,12 +103,12 @@ class LimitedBounds:
                 found.append([root_above(c) * residual for c in constants])
         return tuple(map(round_up, map(min, zip(*filter(None, found), strict=True)))) if found[1:] else None
 
-    def _add_noise(self, k: int, entry: Limited, top: Fraction) -> Limited:
-        """Add the bounds under measurement noise by one Lyapunov function."""
+    def _noise(self, k: int, entry: Limited, top: Fraction) -> Noise:
+        """Return the bounds under measurement noise by one Lyapunov function."""
         noise = self.noise or Fraction(0)
         whole, each = self.bounds.noisy(k, noise)
         norm, most = round_up(entry.norm + whole), round_up((entry.largest or 0) + top * max(each))
-        return replace(entry, noise=noise, noise_function=k, noisy_norm=norm, noisy_largest=most)
+        return Noise(noise, k, norm, most)
 
     def longest_period(
         self, limits: Sequence[Limits], results: Sequence[Limited | None], gain: Gain

@@ -14,7 +14,8 @@ from fractions import Fraction
 import numpy as np
 
 from lmi.exact.numbers import integers
-from ptcc_certify.bounds.deviation.of_family import deviation_on_clock
+from ptcc_certify.bounds.deviation.component_bounds import ComponentBounds, FunctionOf
+from ptcc_certify.bounds.instants import Instants
 from ptcc_certify.certificate.constrained_switching.claims import RateClaim
 from ptcc_certify.certificate.family_proof import ComponentProof, FamilyProof
 from ptcc_certify.checker.common_forms import Scaled
@@ -95,9 +96,7 @@ def deviation_of_signal(proof: FamilyProof, remaining: Sequence[float] | np.ndar
         part = proof.parts[claim.component]
         nodes = part.component.nodes
         x = [proof.initial_state[v] for v in nodes.tolist()]  # type: ignore[index]
-        own = _deviation(proof, claim, part, x, clock)
-        if own is not None:
-            bounds[nodes] = np.minimum(bounds[nodes], own)
+        bounds[nodes] = np.minimum(bounds[nodes], _deviation(proof, claim, part, x, Instants(clock)))
     return bounds
 
 
@@ -113,21 +112,24 @@ def claims_with_forms(proof: FamilyProof) -> list[RateClaim]:
 
 
 def _deviation(
-    proof: FamilyProof, claim: RateClaim, part: ComponentProof, x: Sequence[Fraction], clock: np.ndarray
-) -> np.ndarray | None:
-    """Bound the agents of a component; None where so many switches are allowed that nothing would be said."""
+    proof: FamilyProof, claim: RateClaim, part: ComponentProof, x: Sequence[Fraction], at: Instants
+) -> np.ndarray:
+    """Bound the agents of a component; infinite where so many switches are allowed that nothing would be said."""
     assert claim.forms is not None
     functions = mode_functions(Quotient.of(part.component), claim.forms)
+    everybody, nothing = np.arange(len(x)), np.full((len(x), at.clock.size), np.inf)
+
+    def by(V: CommonForm | SwitchedFunction) -> np.ndarray:
+        return ComponentBounds([FunctionOf(everybody, V, part.rest_states)], x).by_functions(at)
+
     if not all(V.input_constants for V in functions):
-        return None
+        return nothing
     if not isinstance(claim.signal, DwellTime):  # one mode acts for ever
-        own = [deviation_on_clock(V, part.rest_states, x, clock) for V in functions]
-        return np.max([one for one in own if one is not None], axis=0)
+        return np.max([by(V) for V in functions], axis=0)
     switches = claim.signal.switches(proof.protocol.T) if claim.signal.clock == "t" else 1
     if switches * max(map(int.bit_length, claim.ratio.as_integer_ratio())) > _BITS:
-        return None
-    V = SwitchedFunction(functions, claim.rate, claim.ratio**switches)
-    return deviation_on_clock(V, part.rest_states, x, clock)
+        return nothing
+    return by(SwitchedFunction(functions, claim.rate, claim.ratio**switches))
 
 
 def _largest(some: Sequence[Scaled]) -> Scaled:

@@ -11,7 +11,7 @@ from ptcc_certify.model.constrained_switching import ClockShares, JointWindows, 
 from ptcc_certify.theorems.contractions import ExplicitRate
 
 if TYPE_CHECKING:  # classes of signals are told without the solvers
-    from ptcc_certify.bounds.final_state.of_family import ValueEnds
+    from ptcc_certify.bounds.final_state.constant_weights import ValueEnds
     from ptcc_certify.checker.reading import Interval
     from ptcc_certify.lyapunov.clock_shares import ShareForm
     from ptcc_certify.lyapunov.mode_forms import ModeForms

@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 
 from lmi.exact.numbers import longest
-from ptcc_certify.bounds.final_state.of_family import ValueEnds
+from ptcc_certify.bounds.final_state.constant_weights import ValueEnds
 from ptcc_certify.certificate.constrained_switching.claims import (
     Claim,
     FinalValueClaim,

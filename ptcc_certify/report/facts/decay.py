@@ -141,10 +141,10 @@ def _error_fact(standing: Standing, told: tuple[Fraction | float, str, str, str]
 def _limited_error(residual: Sequence[Limited]) -> tuple[Fraction | float, str, str, str]:
     """Return bounds of the error and of every agent's deviation at ``T`` under the first limits, and how many are."""
     entry, *others = residual
-    noise = "" if entry.noise is None else f", |n_k| <= {down(entry.noise, 12)}"
-    size = entry.noisy_norm or entry.norm
+    noise = "" if entry.noise is None else f", |n_k| <= {down(entry.noise.bound, 12)}"
+    size = entry.norm if entry.noise is None else entry.noise.norm
     norm = f"{limits_text(entry.limits)}{noise}: ||E|| <= {up(size, 2)} at T"
-    agents = "" if entry.agents is None or entry.noisy_norm else f", every agent within {up(max(entry.agents), 2)}"
+    agents = "" if entry.agents is None or entry.noise else f", every agent within {up(max(entry.agents), 2)}"
     return size, norm, agents, f"; ... {len(others) + 1} limits in all" if others else ""
 
 

@@ -55,7 +55,7 @@ def _input_fact(certificate: Certificate, effort: Effort) -> Fact:
     if entry is not None:
         text, largest = "bounded under these limits", entry.largest
         if entry.noise is not None:
-            text, largest = f"{text}, |n_k| <= {down(entry.noise, 12)}", entry.noisy_largest
+            text, largest = f"{text}, |n_k| <= {down(entry.noise.bound, 12)}", entry.noise.largest
         nothing = "; under a sample period no number is proved"
     else:
         states = {True: "bounded", False: "NOT BOUNDED from some initial states", None: "not proved bounded"}
@@ -146,10 +146,10 @@ def _limited_facts(effort: Effort) -> Facts:
         largest = "" if entry.largest is None else f", |u_k| <= {up(entry.largest, 4)}"
         text = f"{limits_text(entry.limits)}: ||E|| <= {up(entry.norm, 3)} at T{agents}{largest}"
         yield Fact(head="limited", value=entry.norm, side="up", note=text, detail=True)
-        if entry.noise is not None and entry.noisy_norm is not None and entry.noisy_largest is not None:
-            noise = f"noise |n_k| <= {near(entry.noise)} leaves ||E|| <= {up(entry.noisy_norm, 3)} at T"
-            text = f"{noise}, |u_k| <= {up(entry.noisy_largest, 4)}"
-            yield Fact(head="limited", value=entry.noisy_norm, side="up", note=text, detail=True)
+        if (noise := entry.noise) is not None:
+            text = f"noise |n_k| <= {near(noise.bound)} leaves ||E|| <= {up(noise.norm, 3)} at T"
+            text += f", |u_k| <= {up(noise.largest, 4)}"
+            yield Fact(head="limited", value=noise.norm, side="up", note=text, detail=True)
 
 
 def limits_text(limits: Limits) -> str:

@@ -1,15 +1,12 @@
-"""Where a family that comes to bipartite consensus ends: for unknown constant weights exactly, for every signal nearer.
+"""Where a family that comes to bipartite consensus ends for unknown constant weights, exactly.
 
-**Constant weights.** Let ``z = G X(0)`` and ``c = eta(w)' z``, ``eta(w)`` the normalised left null vector of ``M(L)``.
+Let ``z = G X(0)`` and ``c = eta(w)' z``, ``eta(w)`` the normalised left null vector of ``M(L)``.
 If numbers ``h_k`` satisfy for every node ``k`` of the closed set
 
     z_k + sum_l |w_kl| (h_l - h_k)  <=  c+        at w+ where h_l > h_k, at w- elsewhere,
 
 then ``c <= c+`` for all weights of the mode: multiply by ``eta_k(w) >= 0`` and add. Policy iteration, which solves for
 ``(c, h)`` and takes the worst weights, ends at the maximum, which is so attained. Weights that change may exceed it.
-
-**Every signal.** ``|c - p' G X(0)| <= (kappa / alpha) sqrt(V(0))`` with ``p' 1 = 1``, a common function ``V`` and
-``kappa >= ||p' M(L) G C^r||_(P^-1)`` for every member.
 
 References
 ----------
@@ -28,15 +25,12 @@ import numpy as np
 from lmi.dyadic import dyadic_array, round_to_bits
 from lmi.exact.elementary_enclosures import rounded
 from lmi.sparse_h_matrix import solve
-from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import analyse, find_camps
-from ptcc_certify.lyapunov.common_forms import CommonForm, mean_constant, rounded_up
 from ptcc_certify.lyapunov.interval_rows import IntervalRows, Policy
-from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.kernel import reached
 from ptcc_certify.theorems.lemmas import solve_exact
 
@@ -44,43 +38,6 @@ _ROUNDS = 60
 #: Longest numerators and denominators, in bits, that are written as they are; bits of others, about.
 _SHORT, _BITS = 256, 64
 Interval = tuple[Fraction, Fraction]
-
-
-@dataclass(frozen=True, eq=False)
-class FinalValue:
-    """Ends of the consensus value of one mode over all constant weights in its intervals.
-
-    ``x_k(T) = camps_k c`` with ``lower <= c <= upper``.
-
-    Attributes
-    ----------
-    camps : (N,) int8 array
-        The first node +1.
-    nodes : tuple of int
-        The closed set that decides.
-    lower, upper : Fraction
-    reached_lower, reached_upper : Fraction or None
-        Members have a value that is at most, or at least, this: those of ``members``. Equal to the ends where it was
-        proved in rationals. None of weights that change together.
-    members : tuple of two Policy, or None
-        On the rows of ``nodes``.
-    vectors : tuple of two tuples of Fraction
-        ``h`` of the upper end, and of the lower end, which is that of ``-z``.
-    """
-
-    camps: np.ndarray
-    nodes: tuple[int, ...]
-    lower: Fraction
-    upper: Fraction
-    reached_lower: Fraction | None
-    reached_upper: Fraction | None
-    members: tuple[Policy, Policy] | None
-    vectors: tuple[tuple[Fraction, ...], tuple[Fraction, ...]]
-
-    @property
-    def exact(self) -> bool:
-        """Whether constant weights attain both ends."""
-        return self.reached_lower == self.lower and self.reached_upper == self.upper
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,8 +71,8 @@ class ValueEnds:
         return [(self.lower, self.upper) if g > 0 else (-self.upper, -self.lower) for g in self.camps]
 
 
-def final_value(mode: Mode, x0: Sequence[Fraction]) -> FinalValue:
-    """Enclose the consensus value of a mode over all constant weights in its intervals.
+def value_ends(mode: Mode, x0: Sequence[Fraction]) -> ValueEnds:
+    """Enclose the consensus value of a mode over all constant weights in its intervals, in numbers that a file holds.
 
     Parameters
     ----------
@@ -125,42 +82,9 @@ def final_value(mode: Mode, x0: Sequence[Fraction]) -> FinalValue:
 
     Returns
     -------
-    FinalValue
-        Exact up to 120 nodes in the closed set, and for undirected graphs; else the ends are proved, and the members
-        near them.
-
-    Raises
-    ------
-    HypothesisError
-        The mode does not come to bipartite consensus.
-
-    Examples
-    --------
-    >>> pair = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1)]).modes[0]
-    >>> value = final_value(pair, [Fraction(0), Fraction(6)])
-    >>> value.lower, value.upper, value.exact
-    (Fraction(2, 1), Fraction(3, 1), True)
-    """
-    n = len(mode.labels)
-    camps, violated, _ = find_camps(n, mode.source, mode.target, mode.sign)
-    closed = analyse(mode.mandatory).closed_components
-    if violated.size or len(closed) != 1:
-        raise HypothesisError("the mode does not come to bipartite consensus for all weights in its intervals")
-    nodes = reached(n, mode.target, mode.source, np.array(closed[0].nodes))
-    z = [int(camps[v]) * Fraction(x0[v]) for v in nodes.tolist()]
-    if mode.tied:  # eta = 1 for every member
-        mean = sum(z, Fraction(0)) / len(z)
-        zeros = (Fraction(0),) * len(z)
-        return FinalValue(camps, tuple(nodes.tolist()), mean, mean, mean, mean, None, (zeros, zeros))
-    rows = IntervalRows.of([mode], nodes)
-    root = int(np.searchsorted(nodes, closed[0].nodes[0]))
-    high, least_high, above, most = _largest_value(rows, z, root)
-    low, most_low, below, fewest = _largest_value(rows, [-x for x in z], root)
-    return FinalValue(camps, tuple(nodes.tolist()), -low, high, -most_low, least_high, (fewest, most), (above, below))
-
-
-def value_ends(mode: Mode, x0: Sequence[Fraction]) -> ValueEnds:
-    """Return the ends of :func:`final_value` in numbers that a file holds, rounded outwards where they are long.
+    ValueEnds
+        Exact up to 120 nodes in the closed set, and for undirected graphs, rounded outwards where numbers are long;
+        else the ends are proved, and some member is near them.
 
     Raises
     ------
@@ -173,17 +97,23 @@ def value_ends(mode: Mode, x0: Sequence[Fraction]) -> ValueEnds:
     >>> str(ends.lower), str(ends.upper), str(ends.within), ends.camps
     ('-3', '-2', '0', (1, -1))
     """
-    value = final_value(mode, x0)
-    camps, nodes = tuple(value.camps.tolist()), value.nodes
-    if mode.tied:
-        low, high = -_short_above(-value.lower), _short_above(value.upper)
-        return ValueEnds(camps, nodes, low, high, high - low, None)
-    rows = IntervalRows.of([mode], np.array(nodes))
-    z = [camps[v] * Fraction(x0[v]) for v in nodes]
+    n = len(mode.labels)
+    gauge, violated, _ = find_camps(n, mode.source, mode.target, mode.sign)
+    closed = analyse(mode.mandatory).closed_components
+    if violated.size or len(closed) != 1:
+        raise HypothesisError("the mode does not come to bipartite consensus for all weights in its intervals")
+    nodes, camps = reached(n, mode.target, mode.source, np.array(closed[0].nodes)), tuple(gauge.tolist())
+    z = [camps[v] * Fraction(x0[v]) for v in nodes.tolist()]
+    if mode.tied:  # eta = 1 for every member
+        mean = sum(z, Fraction(0)) / len(z)
+        low, high = -_short_above(-mean), _short_above(mean)
+        return ValueEnds(camps, tuple(nodes.tolist()), low, high, high - low, None)
+    rows = IntervalRows.of([mode], nodes)
+    root = int(np.searchsorted(nodes, closed[0].nodes[0]))
     (above, high, over), (below, low, under) = (
-        _short_end(rows, side, h) for side, h in zip((z, [-x for x in z]), value.vectors, strict=True)
+        _short_end(rows, side, _largest_value(rows, side, root)) for side in (z, [-x for x in z])
     )
-    return ValueEnds(camps, nodes, -low, high, max(over, under), (above, below))
+    return ValueEnds(camps, tuple(nodes.tolist()), -low, high, max(over, under), (above, below))
 
 
 def _short_end(
@@ -212,27 +142,10 @@ def _short_above(x: Fraction) -> Fraction:
     return x if _is_short(x) else rounded(x, _BITS, up=True)
 
 
-def largest_row(
-    rows: IntervalRows, z: Sequence[Fraction], h: Sequence[Fraction], policy: Policy | None = None
-) -> Fraction:
-    """Return ``max_k z_k + sum_l |w_kl| (h_l - h_k)`` over all weights; with a policy, the least ``k`` at its weights.
+def row_values(rows: IntervalRows, z: Sequence[Fraction], h: Sequence[Fraction]) -> list[Fraction]:
+    """Return ``z_k + sum_l |w_kl| (h_l - h_k)`` of every row of one mode, the largest over all weights.
 
-    By the left null vector, the value of every member is at most the first; that of the policy is at least the second.
-
-    Examples
-    --------
-    >>> rows = IntervalRows.of(Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1)]).modes, np.array([0, 1]))
-    >>> str(largest_row(rows, [Fraction(0), Fraction(6)], [Fraction(0), Fraction(3)]))
-    '3'
-    """
-    values = row_values(rows, z, h, policy)
-    return max(values) if policy is None else min(values)
-
-
-def row_values(
-    rows: IntervalRows, z: Sequence[Fraction], h: Sequence[Fraction], policy: Policy | None = None
-) -> list[Fraction]:
-    """Return ``z_k + sum_l |w_kl| (h_l - h_k)`` of every row of one mode, the largest over all weights or of a policy.
+    By the left null vector, the value of every member is at most the largest of them, and of some at least the least.
 
     Examples
     --------
@@ -242,18 +155,15 @@ def row_values(
     """
     scale = math.lcm(*(x.denominator for x in h))
     whole = np.array([x.numerator * (scale // x.denominator) for x in h] + [0] * rows.outside, dtype=object)
-    pull = rows.pull(whole).ravel() if policy is None else rows.pull_of(policy, whole)
     unit = rows.unit / scale
-    return [x - unit * p for x, p in zip(z, pull.tolist(), strict=True)]
+    return [x - unit * p for x, p in zip(z, rows.pull(whole).ravel().tolist(), strict=True)]
 
 
 # ---------------------------------------------------------------------- policy iteration
 
 
-def _largest_value(
-    rows: IntervalRows, z: list[Fraction], root: int
-) -> tuple[Fraction, Fraction, tuple[Fraction, ...], Policy]:
-    """Return a bound of all values, a value that a member reaches or exceeds, ``h``, and that member."""
+def _largest_value(rows: IntervalRows, z: list[Fraction], root: int) -> tuple[Fraction, ...]:
+    """Return ``h`` that proves the largest value, or one that is little larger."""
     floats = np.array([nearest_float(x) for x in z])
     top = float(np.abs(floats).max(initial=0)) or 1.0
     policy = rows.worst(np.zeros(rows.n))
@@ -269,10 +179,7 @@ def _largest_value(
         return _largest_exactly(rows, z, root, policy)
     whole, power = dyadic_array(np.where(np.isfinite(h), h, 0.0) * top)
     vector = tuple(int(x) * Fraction(2) ** power for x in whole.tolist())
-    bound, value = largest_row(rows, z, vector), largest_row(rows, z, vector, policy)
-    if bound > max(z):
-        bound, vector = max(z), (Fraction(0),) * rows.n
-    return bound, value, vector, policy
+    return vector if max(row_values(rows, z, vector)) <= max(z) else (Fraction(0),) * rows.n
 
 
 def _solve(rows: IntervalRows, policy: Policy, z: np.ndarray, root: int) -> tuple[np.ndarray, float]:
@@ -291,14 +198,11 @@ def _solve(rows: IntervalRows, policy: Policy, z: np.ndarray, root: int) -> tupl
     return h, c
 
 
-def _largest_exactly(
-    rows: IntervalRows, z: list[Fraction], root: int, policy: Policy
-) -> tuple[Fraction, Fraction, tuple[Fraction, ...], Policy]:
+def _largest_exactly(rows: IntervalRows, z: list[Fraction], root: int, policy: Policy) -> tuple[Fraction, ...]:
     while True:
         c, h = _solve_exactly(rows, policy, z, root)
-        bound = largest_row(rows, z, h)
-        if bound == c:
-            return c, c, h, policy
+        if max(row_values(rows, z, h)) == c:
+            return h
         heard = np.array([h[j] > h[k] for k, j in zip(rows.target.tolist(), rows.source.tolist(), strict=True)])
         policy = Policy(policy.mode, heard)
 
@@ -319,59 +223,6 @@ def _solve_exactly(
     h = [row[0] for row in solution]
     c, h[root] = h[root], zero
     return c, tuple(h)
-
-
-# ---------------------------------------------------------------------- every signal
-
-
-def weighted_mean_interval(
-    quotient: Quotient,
-    function: CommonForm,
-    camps: Sequence[int],
-    x: Sequence[Fraction],
-    p: Sequence[Fraction] | None = None,
-) -> Interval:
-    """Enclose the consensus value ``c`` of every signal about the weighted mean ``p' G X(0)``.
-
-    Parameters
-    ----------
-    quotient : Quotient
-    function : CommonForm
-        Of positive rate.
-    camps : sequence of N +1/-1
-    x : sequence of N Fraction
-    p : sequence of N Fraction, optional
-        With the sum 1. By default near to the left null vector at the middles of all intervals, for which the interval
-        is short; the exact one of undirected graphs makes it a point.
-
-    Raises
-    ------
-    HypothesisError
-        The function does not decay, or the sum is not 1.
-
-    Examples
-    --------
-    >>> from ptcc_certify.lyapunov.common_form_search import search_common_forms
-    >>> from ptcc_certify.theorems.family_behaviour import decide
-    >>> pair = decide(Family.from_intervals([("a", "b", 9, 11), ("b", "a", 9, 11)]))[0]
-    >>> quotient, x = Quotient.of(pair), (Fraction(0), Fraction(1))
-    >>> low, high = weighted_mean_interval(quotient, search_common_forms(quotient).functions[0], (1, 1), x)
-    >>> round(float(low), 2), round(float(high), 2)
-    (0.44, 0.56)
-    """
-    if function.rate <= 0:
-        raise HypothesisError("the function has no positive rate for every signal")
-    p = middle_left_vector(quotient.family) if p is None else p
-    if sum(p, Fraction(0)) != 1:
-        raise HypothesisError("the sum of the weights is not 1")
-    signed = [weight * camp for weight, camp in zip(p, camps, strict=True)]
-    constant = mean_constant(function, dict(enumerate(signed)))
-    if constant is None:
-        raise HypothesisError("the matrix of the function is not proved definite")
-    mean = sum((s * y for s, y in zip(signed, x, strict=True)), Fraction(0))
-    reach = 2 / function.rate * root_above(constant * function.value(quotient.coordinates(x)))
-    reach = rounded_up(reach)
-    return mean - reach, mean + reach
 
 
 def middle_left_vector(family: Family) -> tuple[Fraction, ...]:
