@@ -299,7 +299,7 @@ def leaders(draw: Draw) -> tuple[int, list[str], dict[str, str]]:
 
 
 def beside(draw: Draw) -> tuple[int, list[str], dict[str, str]]:
-    """Return late messages, and leaders that move, of a family that draws its followers to the same targets."""
+    """Return late messages, leaders that move, caps, disturbances, noise of a family with the same targets throughout."""
     rng, count = np.random.default_rng(draw.getrandbits(32)), draw.randint(1, 3)
     family = led_family(rng, count, draw.randint(1, 12), draw.randint(1, 3), common=count > 1 and draw.random() < 0.4)
     files = {f"m{k}.csv": text_of_mode(mode, family.labels) for k, mode in enumerate(family.modes)}
@@ -310,9 +310,9 @@ def beside(draw: Draw) -> tuple[int, list[str], dict[str, str]]:
         command += draw.sometimes(0.3, "--period", draw.number(1e-3, 0.05), "--packet-loss", str(draw.randint(0, 4)))
         command += draw.sometimes(0.25, "--max-residual", draw.number(1e-6, 1))
     command += draw.sometimes(0.5, "--gain-cap", draw.number(2, 50))
-    if not late or draw.random() < 0.4:
-        command += ["--leader-speed", draw.number(0.01, 2), *draw.sometimes(0.3, "--delta", draw.number(0.01, 1))]
-        command += draw.sometimes(0.3, "--sign-gain", draw.number(0.1, 5))
+    if draw.random() < (0.4 if late else 0.6):
+        command += ["--leader-speed", draw.number(0.01, 2), *draw.sometimes(0.3, "--sign-gain", draw.number(0.1, 5))]
+    command += draw.sometimes(0.3, "--delta", draw.number(0.01, 1))
     command += draw.sometimes(0.3, "--noise", draw.number(0.001, 0.1))
     return family.n_nodes, command, files
 
