@@ -299,7 +299,7 @@ def leaders(draw: Draw) -> tuple[int, list[str], dict[str, str]]:
 
 
 def beside(draw: Draw) -> tuple[int, list[str], dict[str, str]]:
-    """Return late messages, leaders that move, caps, disturbances, noise of a family with the same targets throughout."""
+    """Return late messages, leaders that move, caps, disturbances and noise of a family of which members agree."""
     rng, count = np.random.default_rng(draw.getrandbits(32)), draw.randint(1, 3)
     family = led_family(rng, count, draw.randint(1, 12), draw.randint(1, 3), common=count > 1 and draw.random() < 0.4)
     files = {f"m{k}.csv": text_of_mode(mode, family.labels) for k, mode in enumerate(family.modes)}
