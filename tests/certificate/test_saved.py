@@ -30,6 +30,8 @@ from ptcc_certify.errors import FormatError, ParameterError
 from ptcc_certify.examples import EXAMPLES, load_graph
 from ptcc_certify.model.asks import Expectations
 
+pytestmark = pytest.mark.usefixtures("quick_search")
+
 NOMINAL = ptcc.NominalProtocol(T="0.6", rho1="0.2", rho2="0.5", kappa=1)
 SLIDING = ptcc.SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
 #: One class of every theorem row, and the corners of the input.

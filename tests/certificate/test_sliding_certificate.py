@@ -34,6 +34,8 @@ from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
 
+pytestmark = pytest.mark.usefixtures("quick_search")
+
 RUNS = [(number, name) for number in "456" for _, name, _ in select(number)]
 KINDS = ("expression", "worst-case", "telegraph", "constant", "high frequency", "state-dependent", "sampled")
 

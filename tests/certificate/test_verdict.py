@@ -40,6 +40,8 @@ from ptcc_certify.report.page import report_html
 from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.report.statement import report_latex
 
+pytestmark = pytest.mark.usefixtures("quick_search")
+
 CLASSES = dict(all_classes())
 WEAK = {"rho1": "0.1", "rho2": "0.05", "kappa": 2}
 
@@ -147,6 +149,7 @@ def strong() -> Certificate:
     return certify(load_graph("fig1a"), protocol, [9, -8, 7, -6, 5, 4], asks=Asks(simulation=False))
 
 
+@pytest.mark.usefixtures("every_class")
 @pytest.mark.few(6)
 @pytest.mark.parametrize("rate", ["met", "refuted", "left open", None])
 @pytest.mark.parametrize("most", ["met", "refuted", "left open", None])

@@ -111,7 +111,6 @@ def case(seed: int, least: Fraction) -> tuple[PrescribedGain, Fraction, Fraction
 # ---------------------------------------------------------------------- roots, exponentials, the gain
 
 
-@pytest.mark.few(10)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_roots_and_decays_are_bounded_from_above(seed: int):
     x = log_uniform(np.random.default_rng(seed), 1e-3, 1e3)
@@ -122,7 +121,6 @@ def test_roots_and_decays_are_bounded_from_above(seed: int):
     assert 1 <= decay_above(F(0)) <= 1 + F(1, 2**60)
 
 
-@pytest.mark.few(10)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_gain_its_clock_and_the_integral_of_its_square_are_enclosed(seed: int):
     rng = np.random.default_rng(seed)
@@ -141,7 +139,6 @@ def test_the_gain_its_clock_and_the_integral_of_its_square_are_enclosed(seed: in
 # ---------------------------------------------------------------------- peak, energy, length
 
 
-@pytest.mark.few(10)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_no_peak_is_above_its_bound_and_at_the_crossing_it_is_the_bound(seed: int):
     gain, held, start, rate, instants = case(seed, F(2))
@@ -151,7 +148,6 @@ def test_no_peak_is_above_its_bound_and_at_the_crossing_it_is_the_bound(seed: in
     assert bounds[-1] <= peak * (1 + 1e-8)
 
 
-@pytest.mark.few(10)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_no_energy_is_above_its_bound(seed: int):
     """At the crossing the bound is at most ``rate k / (rate k - 1)`` times the energy: ``p <= gain`` by parts."""
@@ -163,7 +159,6 @@ def test_no_energy_is_above_its_bound(seed: int):
     assert bounds[-1] <= energy * q / (q - 1) * (1 + 1e-8)
 
 
-@pytest.mark.few(10)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_no_length_is_above_its_bound_and_at_the_crossing_it_is_the_bound(seed: int):
     gain, held, start, rate, instants = case(seed, F(0))
@@ -213,7 +208,6 @@ def random_limits(seed: int, gain: PrescribedGain) -> Limits:
     return [Limits(cap), Limits(None, stop), Limits(cap, stop)][seed % 3]
 
 
-@pytest.mark.few(10)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_clock_of_a_cap_and_a_stop_is_the_integral_from_below(seed: int):
     gain = random_gain(np.random.default_rng(seed))
@@ -232,7 +226,6 @@ def test_the_clock_of_a_cap_and_a_stop_is_the_integral_from_below(seed: int):
     assert seen <= float(top) * (1 + 1e-9)
 
 
-@pytest.mark.few(10)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_clock_of_a_sampled_gain_is_not_above_the_sum(seed: int):
     rng = np.random.default_rng(seed)
@@ -275,7 +268,6 @@ def test_limits_at_the_edges():
             bound(gain)
 
 
-@pytest.mark.few(20)
 @pytest.mark.parametrize("last", [1, 3, 2000])
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_held_gain_leaves_no_more_than_what_its_periods_leave_together(
@@ -314,7 +306,6 @@ def test_ever_shorter_periods_leave_ever_less():
         sampled_above(gain, Limits(F(5)), F(4), F(4))
 
 
-@pytest.mark.few(10)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_square_of_a_limited_gain_is_integrated_from_above(seed: int):
     gain = random_gain(np.random.default_rng(seed))
@@ -332,7 +323,6 @@ def test_the_square_of_a_limited_gain_is_integrated_from_above(seed: int):
 # ---------------------------------------------------------------------- the energy by two Lyapunov equations
 
 
-@pytest.mark.few(10)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_gain_is_split_between_two_exponentials_of_the_clock(seed: int):
     """``gain <= rho1 + (k/T) (p + e^(s/k - p))`` at all times, at most twice the gain for the largest ``p``."""
@@ -349,7 +339,6 @@ def test_the_gain_is_split_between_two_exponentials_of_the_clock(seed: int):
             assert (split <= 2 * values * (1 + 1e-12)).all()
 
 
-@pytest.mark.few(10)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_energy_is_at_most_doubled_by_the_split(seed: int):
     """Of one mode, ``E = e^(-r s / 2)``: ``int ||E||^2 ds = 1/r`` and ``int e^(s/k) ||E||^2 ds = 1/(r - 1/k)``."""
@@ -377,7 +366,6 @@ def floats(values: Any) -> np.ndarray:
     return np.array(values, dtype=float)
 
 
-@pytest.mark.few(10)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_linear_function_is_largest_where_it_is_largest(seed: int):
     rng = np.random.default_rng(seed)
@@ -401,7 +389,6 @@ def test_a_linear_function_is_largest_where_it_is_largest(seed: int):
     assert np.abs(middle + v @ along).max() <= bound * (1 + 1e-12)
 
 
-@pytest.mark.few(10)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_form_is_nowhere_larger_than_its_bound(seed: int):
     rng = np.random.default_rng(seed)
@@ -420,7 +407,6 @@ def test_a_form_is_nowhere_larger_than_its_bound(seed: int):
     assert diagonal.value(sizes, sizes=True) == diagonal.value(sizes)
 
 
-@pytest.mark.few(10)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_no_start_of_a_set_has_a_larger_form_than_its_bound(seed: int):
     """``V`` is convex: over a box it is largest in a corner. In both coordinates, diagonal and full."""

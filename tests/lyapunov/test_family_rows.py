@@ -43,7 +43,6 @@ def compare(seed: int) -> None:
     assert best * (1 - 1e-9) <= float(decay.upper_bound) < best * (1 + 1e-4)
 
 
-@pytest.mark.few(8)
 @pytest.mark.parametrize("seed", range(25))
 def test_followers_decay_at_the_least_rate_of_all_vertices_and_no_faster(seed):
     compare(seed)

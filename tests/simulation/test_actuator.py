@@ -144,7 +144,6 @@ def test_the_clock_increases_and_stays_below_the_cap_times_t(T, rho1, pole, cap,
 # ---------------------------------------------------------------------- undisturbed runs
 
 
-@pytest.mark.few(7)
 @pytest.mark.parametrize("limits", LIMITS, ids=str)
 def test_the_state_is_the_matrix_exponential_of_the_clock(limits):
     rng = np.random.default_rng(len(str(limits)))
@@ -327,7 +326,7 @@ def test_a_disturbed_run_is_that_of_another_integrator(text, delta, function):
     assert f"disturbance {'constant' if not isinstance(text, str) else text}" in repr(run)
 
 
-@pytest.mark.few(7)
+@pytest.mark.few(13)
 @pytest.mark.parametrize("limits", LIMITS, ids=str)
 @pytest.mark.parametrize("noisy", [False, True])
 def test_a_disturbed_and_noisy_run_behind_limits_is_that_of_another_integrator(limits, noisy):

@@ -154,7 +154,6 @@ def optimum_of_another_solver(structure: Structure, V: LyapunovFunction, theorem
     return float(t.value) * unit
 
 
-@pytest.mark.few(7)
 @pytest.mark.parametrize("name", ["1.2", "2.1 K=1", "2.1 K>=2", "2.2", "3.1 all single", "3.1 mixed no single", "3.2"])
 @pytest.mark.parametrize("seed", range(2))
 def test_the_objective_of_a_row_is_the_optimum_of_another_solver(name: str, seed: int):
@@ -168,7 +167,6 @@ def test_the_objective_of_a_row_is_the_optimum_of_another_solver(name: str, seed
     )
 
 
-@pytest.mark.few(5)
 @pytest.mark.parametrize("theorem", ["2.1", "2.2", "3.1 no single", "3.1 mixed", "3.2"])
 @pytest.mark.parametrize("seed", range(3))
 def test_the_chosen_rho_beats_a_thousand_others(theorem: str, seed: int):
