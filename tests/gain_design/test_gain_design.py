@@ -189,6 +189,7 @@ def test_a_smaller_residual_takes_longer(name):
 # ---------------------------------------------------------------------- what no gains can
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", thinned([*GRAPHS, "pair", "trio", "random0", "random4"], 3))
 def test_below_the_bound_every_gain_fails(name):
     graph = graph_of(name)

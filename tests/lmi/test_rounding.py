@@ -193,6 +193,7 @@ def _row_of_table(text: str, name: str) -> list[str]:
     return [number for row in rows for number in re.findall(NUMBER, row)]
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("k", GRAPHS)
 def test_page_and_statement_round_to_the_safe_side(k: int, tmp_path: Path):
     cert = made(k)
