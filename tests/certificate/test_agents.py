@@ -535,7 +535,6 @@ def test_a_bound_that_is_larger_than_the_way_of_the_agents_says_little_by_t():
     assert assessment.useful is False and "a larger decay, such as 8, leaves less" in assessment.text
 
 
-@pytest.mark.few(0)
 def test_the_coupling_is_not_that_of_a_fast_function_with_a_huge_overshoot_constant():
     edges = [
         ("1", "2", "0.8"),
