@@ -230,8 +230,8 @@ def judge_rate_beside(proof: GraphProof | FamilyProof, least: Fraction, what: st
     late = proof.late
     if proof.constant or proof.agents is not None:
         return None
-    if proof.asked_leaders is not None:
-        return Answer(OPEN, what, f"no rate is proved {proof.asked_leaders.while_told}")
+    if (leaders := proof.asked_leaders) is not None and (leaders.total or leaders.sign_gain is not None):
+        return Answer(OPEN, what, f"no rate is proved {leaders.while_told}")
     if any(limits.sample_period is not None for limits in proof.limits):
         return Answer(OPEN, what, "no rate is proved of a gain that is held")
     if proof.asked_messages is None or (late is not None and late.direct):

@@ -256,7 +256,7 @@ def _use_of_tracking(late: LateBounds) -> Use:
     T = float(late.case.protocol.T)
     first, last = (float(x) for x in late.largest_bound([0.0, 0.99 * T]))
     relative = " from within 1 of it" if late.relative else ""
-    remark = f"every follower within {up(last, 2)} of its target at 0.99 T{relative}"
+    remark = f"every follower within {up(last, 2)} of its {late.leaders.goal} at 0.99 T{relative}"
     useful = last <= max(USEFUL * max(first, float(late.leaders.total) * T), _NOTHING)
     if late.inputs is not None:
         return Use(useful, remark)

@@ -77,8 +77,15 @@ give 2 or more
 
     @property
     def while_told(self) -> str:
-        """During what something holds or not: while they move, or where they rest under disturbances."""
-        return "while leaders move" if self.speed else "under disturbances"
+        """During what something holds or not: while they move, under disturbances, or under a cap alone."""
+        if self.speed:
+            return "while leaders move"
+        return "under disturbances" if self.disturbance else "under a cap"
+
+    @property
+    def goal(self) -> str:
+        """Where followers are drawn to: a target, or where leaders rest and nothing disturbs a final state."""
+        return "target" if self.total else "final state"
 
     @property
     def total(self) -> Fraction:

@@ -269,6 +269,16 @@ def test_what_a_cap_leaves_bounds_runs_of_members():
     assert 0.05 * made.late.largest < max(runs) <= made.late.largest
 
 
+def test_what_is_asked_of_a_family_under_a_cap_alone_is_told_of_the_cap():
+    asks = Asks(expectations=Expectations("bipartite consensus", min_rate=Fraction(1, 10)))
+    made = certify(UNSURE, PROTOCOL, [1, 2, -3], limits=GainLimits(gain_cap=20), asks=asks)
+    text = made.assessment.text
+    assert "bipartite consensus at T under a cap (nothing settles under a cap); met: rate >= 0.1" in text
+    page = report_html(ptcc.read_certificate(made))
+    for word in ("under disturbances", "of its target", "leaders move", "late messages"):
+        assert word not in " ".join((made.summary(), text, page)), word
+
+
 def test_disturbances_and_noise_of_a_family_are_those_of_followers_and_of_what_is_heard():
     limits, asks = GainLimits(gain_cap=20), Asks(delta="0.1", noise="0.01")
     noisy = certify(UNSURE, PROTOCOL, [1, 2, -3], limits=limits, asks=asks)

@@ -100,9 +100,7 @@ def _vehicles(late: LateBounds) -> Facts:
 
 def _tracking(late: LateBounds, leaders: MovingLeaders, at: Fraction | None) -> Facts:
     """Tell how followers track leaders that move, of which they hear at once."""
-    goal, head = "target", "tracking"
-    if not leaders.total:  # a cap is all that was asked
-        goal, head = "final state", "limited"
+    goal, head = leaders.goal, "tracking" if leaders.total else "limited"  # where a cap is all that was asked
     if leaders.total or leaders.sign_gain is not None:
         yield Fact(head="leaders", note=leaders_text(leaders))
     if not late.rows:
