@@ -11,8 +11,10 @@ from typing import Any
 from asked import certify_words
 
 from ptcc_certify import Agents, Certificate, GainLimits, NominalProtocol, SignedDigraph, SlidingModeProtocol, certify
+from ptcc_certify.certificate import graph_certification
 from ptcc_certify.checker import digest
 from ptcc_certify.examples import EXAMPLES, load_graph
+from ptcc_certify.lyapunov.search import search_functions
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.initial_state import InitialState
 
@@ -107,6 +109,11 @@ MADE = {
 }
 
 
-@cache
 def example(name: str) -> Certificate:
+    """The certificate of a name: one for tests of which the search is quick, and one for the others."""
+    return _example(name, graph_certification.search_functions is search_functions)
+
+
+@cache
+def _example(name: str, whole: bool) -> Certificate:
     return MADE[name]()

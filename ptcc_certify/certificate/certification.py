@@ -233,6 +233,7 @@ def with_word_of_check(certificate: Certificate) -> Certificate:
 
 def _read_family(case: Case) -> Family:
     """Return the family that is asked about, or refuse what it does not take."""
+    refuse_before_the_graph(case)
     refuse_of_families(case)
     family = as_family(case.graph, uncertainty=case.uncertainty)
     if case.messages is not None or case.leaders is not None:

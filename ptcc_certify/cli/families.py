@@ -237,7 +237,7 @@ def asked_signal(family: Family, protocol: Protocol, options: shared.Options) ->
     """Return the signals of which more is asked of a family, or refuse what is certified of one graph alone."""
     from ptcc_certify.certificate.constrained_switching.search import require_nominal
 
-    refuse_options(options)
+    refuse_options(options, certified=True)
     _refuse_disturbance(options)
     given, modes = len(options["share"]), len(family.modes)
     if given not in (0, modes):
@@ -285,11 +285,15 @@ def _refuse_disturbance(options: shared.Options) -> None:
         )
 
 
-def refuse_options(options: shared.Options) -> None:
-    """Refuse what is asked of one graph alone, on the command line or in a scenario."""
-    source = click.get_current_context().get_parameter_source
-    foreign = [*_NOT_OF_FAMILIES, *(["disturbance"] if options["kind"] == "nominal" else [])]
-    for name in foreign:
+def refuse_options(options: shared.Options, certified: bool = False) -> None:
+    """Refuse what is asked of one graph alone, on the command line or in a scenario.
+
+    A cap of the gain, disturbances and noise are certified of families, and neither drawn nor simulated.
+    """
+    source, nominal = click.get_current_context().get_parameter_source, options["kind"] == "nominal"
+    foreign = [*_NOT_OF_FAMILIES, *(["disturbance"] if nominal else [])]
+    foreign += [] if certified else ["gain_cap", "noise", *(["delta"] if nominal else [])]
+    for name in (name for name in foreign if name in options):
         given = source(name) in (ParameterSource.COMMANDLINE, ParameterSource.DEFAULT_MAP)
         if given and options[name] not in (None, False):
             raise ParameterError(f"{flag_of(name)} is for one graph, not for families yet; leave it out")

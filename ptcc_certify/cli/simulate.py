@@ -209,6 +209,8 @@ def _run_beside(
         asks, limits = Asks(noise=options["noise"]), shared.limits_of(options)
         case = Case(signed, protocol, messages=messages, leaders=leaders, limits=limits, asks=asks).with_rows()
         messages, leaders = case.messages, case.leaders
+        if messages is None:
+            raise ParameterError("--noise: is not simulated with leaders at rest; leave --leader-speed out")
     sigma0 = shared.sigma0_of(protocol, options, signed)
     x0 = shared.read_initial_state(options["x0"], options["seed"], signed)
     more: Any = {"messages": messages, "leaders": leaders}

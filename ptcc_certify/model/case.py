@@ -16,7 +16,7 @@ from ptcc_certify.model.base import Protocol
 from ptcc_certify.model.constrained_switching import SignalClass
 from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.initial_state import InitialState
-from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.late_messages import LateMessages, told_leaders
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.parameters import parameter
 
@@ -75,10 +75,7 @@ class Case:
             if (value := getattr(self, name)) is not None and not isinstance(value, kind):
                 mend = f"give {kind.__name__}({example}), say"
                 raise ParameterError(name, f"= {shorten(repr(value))} is none; {mend}")
-        if self.messages is not None and self.messages.leaders not in (None, self.leaders):
-            if self.leaders is not None:
-                raise ParameterError("leaders", "is given twice, beside the messages and by them; leave one out")
-            object.__setattr__(self, "leaders", self.messages.leaders)
+        object.__setattr__(self, "leaders", told_leaders(self.messages, self.leaders))
         for entry in limits:
             if not isinstance(entry, Limits):
                 raise ParameterError(f"limits holds {shorten(repr(entry))}; give GainLimits(gain_cap=50), say")

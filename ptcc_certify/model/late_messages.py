@@ -255,6 +255,25 @@ lambda of L, or measure the own state without delay
         return f"LateMessages({', '.join(fields)})"
 
 
+def told_leaders(messages: LateMessages | None, leaders: MovingLeaders | None) -> MovingLeaders | None:
+    """Return the leaders that are told beside messages or by them.
+
+    Raises
+    ------
+    ParameterError
+        Both tell of leaders, and of others.
+
+    Examples
+    --------
+    >>> told_leaders(LateMessages("0.1", leaders=MovingLeaders(speed=1)), None)
+    MovingLeaders(speed=1, disturbance=0)
+    """
+    own = None if messages is None else messages.leaders
+    if None not in (own, leaders) and own != leaders:
+        raise ParameterError("leaders", "is given twice, beside the messages and by them; leave one out")
+    return own if leaders is None else leaders
+
+
 def _read(delays: Mapping[Any, Any]) -> dict[Any, Fraction]:
     """Return delays by edge; each number is read once, for there may be many edges and few delays."""
     known: dict[Any, Fraction] = {}

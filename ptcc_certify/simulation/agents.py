@@ -224,6 +224,7 @@ def simulate_agents(
         motion = _Deviations(graph, begin, block, protocol, rate, rtol)
         z[seen], _ = sample(motion, limited, Instants(*(values[seen] for values in instants)))
     scaled = np.moveaxis(np.einsum("km,imc->ikc", U, z).reshape(len(q), N, d, n), 0, -1)
+    scaled[..., ~seen] = np.nan  # of agents alone, too
     nearly = np.where(seen, q, _NEXT)
     free = np.einsum("mij,kdj->kdim", _free_motion(protocol, nearly), common.reshape(N, d, n))
     clock, eta = protocol.clock(q), np.array([protocol.value(x) for x in nearly])

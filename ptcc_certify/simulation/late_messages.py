@@ -28,7 +28,7 @@ from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.model.base import Protocol, refuse_no_protocol
 from ptcc_certify.model.gain import Gain
 from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.late_messages import LateMessages, told_leaders
 from ptcc_certify.model.limited_gain import LimitedGain
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.refusals import refuse_together
@@ -124,7 +124,7 @@ def simulate_late(
         raise ParameterError("messages", f"= {shorten(repr(messages))} is none; give LateMessages(delay='0.01'), say")
     if leaders is not None and not isinstance(leaders, MovingLeaders):
         raise ParameterError("leaders", f"= {shorten(repr(leaders))} is none; give MovingLeaders(speed=1), say")
-    graph = as_graph(graph)
+    graph, leaders = as_graph(graph), told_leaders(messages, leaders)
     steps, random = whole_number(steps, "steps", 2, MOST_STEPS), whole_number(seed, "seed", 0, 2**63)
     if deadlines is not None and not isinstance(deadlines, Sequence):
         raise ParameterError("deadlines", f"= {shorten(repr(deadlines))} are none; give one for each agent")

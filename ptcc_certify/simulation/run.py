@@ -27,7 +27,7 @@ from ptcc_certify.model import Protocol
 from ptcc_certify.model.base import refuse_no_protocol
 from ptcc_certify.model.disturbance import StateDependent, as_disturbance
 from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.late_messages import LateMessages, told_leaders
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.refusals import refuse_together
 from ptcc_certify.simulation.cvodes import Motion, Tolerances
@@ -181,6 +181,11 @@ def simulate(
     """
     refuse_no_protocol(protocol)
     how, beside = _with_defaults(options), messages is not None or leaders is not None
+    if isinstance(messages, LateMessages):
+        leaders = told_leaders(messages, leaders)
+        if messages.tracks and actuator is None:  # nothing is late of what is heard
+            actuator = None if messages.gain_cap is None else GainLimits(gain_cap=messages.gain_cap)
+            messages = None
     family = as_family(graph) if not beside and (signal is not None or is_family(graph)) else None
     one = as_graph(graph) if family is None else family.modes[0].mandatory
     sigma0, disturbance, layer = how["sigma0"], how["disturbance"], how["boundary_layer"]

@@ -42,6 +42,7 @@ from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.simulation.late_messages import PATTERNS, simulate_late
 from ptcc_certify.simulation.moving_leaders import simulate_tracking
+from ptcc_certify.simulation.run import simulate
 
 #: What rounding in floats may do to a run, relatively.
 ROUNDING = 1e-9
@@ -902,3 +903,27 @@ def test_leaders_are_told_by_messages_or_beside_them() -> None:
     )
     with pytest.raises(ParameterError, match="given twice"):
         certify(chain, NominalProtocol(), messages=messages, leaders=MovingLeaders(speed=2))
+
+
+def test_runs_take_leaders_by_messages_or_beside_them() -> None:
+    chain, protocol = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1)]), NominalProtocol(1, 1, 3, 1)
+    leaders, late = MovingLeaders(speed=1), LateMessages("0.01")
+    for messages in (late, None):
+        told = replace(late, leaders=leaders) if messages else LateMessages(leaders=leaders)
+        beside = simulate(chain, protocol, [1, 5, 2], messages=messages, leaders=leaders)
+        by_them = simulate(chain, protocol, [1, 5, 2], messages=told)
+        assert by_them.conditions.leaders == leaders
+        np.testing.assert_array_equal(by_them.states, beside.states)
+    capped = simulate(chain, protocol, [1, 5, 2], messages=LateMessages(gain_cap=5, leaders=leaders))
+    assert capped.conditions.actuator == GainLimits(gain_cap=5)
+    for run in (simulate_late, lambda *words, **more: simulate(*words[:2], words[3], messages=words[2], **more)):
+        with pytest.raises(ParameterError, match="given twice"):
+            run(chain, protocol, replace(late, leaders=leaders), [1, 5, 2], leaders=MovingLeaders(speed=2))
+
+
+def test_inputs_beyond_all_floats_are_not_proved_bounded() -> None:
+    chain = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)])
+    messages, asks = LateMessages("0.1", value_error="1e200", gain_cap="1e200"), Asks(simulation=False, method="paper")
+    made = certify(chain, NominalProtocol(1, 1, 3, 1), [1, 2, 3], messages=messages, asks=asks)
+    assert made.checked is not None and made.checked.accepted
+    assert made.late is not None and made.late.inputs is None and "not proved bounded" in made.assessment.text

@@ -12,7 +12,7 @@ from lmi.exact.work import WorkError, limited
 from ptcc_certify import NominalProtocol
 from ptcc_certify.certificate import family_certification
 from ptcc_certify.certificate.family_proof import ComponentProof
-from ptcc_certify.checker import family_function
+from ptcc_certify.checker import common_forms
 from ptcc_certify.checker.matrix_products import WITH_MULTIPLIERS, need_rows_with_multipliers
 from ptcc_certify.checker.reading import RejectedError
 from ptcc_certify.errors import ParameterError
@@ -131,7 +131,7 @@ def test_functions_that_the_check_refuses_are_left_out(monkeypatch):
     def refuse(rows: int) -> None:
         raise RejectedError("too many rows")
 
-    monkeypatch.setattr(family_function, "need_rows_with_multipliers", refuse)
+    monkeypatch.setattr(common_forms, "need_rows_with_multipliers", refuse)
     monkeypatch.setattr(family_certification, "LARGEST_ROWS", 5)
     made = certify_family(_three_uncertain_edges(), PROTOCOL, [1, 2, 3])
     assert made.verdict == "certified" and made.rate is None and made.parts[0].functions == ()
@@ -146,7 +146,7 @@ def test_what_the_check_refuses_is_not_called_proved(monkeypatch):
     def refuse(rows: int) -> None:
         raise RejectedError("too many rows")
 
-    monkeypatch.setattr(family_function, "need_rows_with_multipliers", refuse)
+    monkeypatch.setattr(common_forms, "need_rows_with_multipliers", refuse)
     made = certify_family(_three_uncertain_edges(), PROTOCOL, [1, 2, 3])
     text = " ".join("\n".join(summary_lines(made, "net")).split())
     assert "proved" not in text and "undecided: the independent check rejects family-rate" in text

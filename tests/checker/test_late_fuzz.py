@@ -23,7 +23,7 @@ from random_mutants import WAYS, Rng, fraction, mutant, nudged, pick
 
 from ptcc_certify.checker import check
 from ptcc_certify.checker import graph as checked_graph
-from ptcc_certify.checker import late_messages as checked_messages
+from ptcc_certify.checker import messages as checked_messages
 
 SEED = int(os.environ.get("PTCC_FUZZ_SEED", "0"))
 #: Certificates each field of which is changed.

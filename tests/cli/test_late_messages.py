@@ -570,7 +570,7 @@ def test_late_messages_and_leaders_that_move_from_certify_to_page() -> None:
     words = ("--delay", "0.02", "--leader-speed", "0.5", "--delta", "0.2", *START)
     run = ptcc("certify", "team.csv", *words, *PAPER, "--max-residual", "9", "-o", "both.json")
     text = " ".join(run.out.split())
-    assert run.code == 0 and "leaders speed |x_j'| <= 0.5; any |d_k| <= 0.2" in text, run
+    assert run.code == 0 and "leaders speed |x_j'| <= 0.5; any |d_k| <= 0.2 of followers" in text, run
     assert "of its target at T, within" in text and "of that no gain takes out of this bound" in text
     assert "nothing late, leaders at rest" in text and "x(T)" not in text and "met: within 9 at T" in text
     assert ptcc("check", "both.json").code == 0

@@ -294,8 +294,8 @@ def test_python_takes_a_family_in_many_forms():
     ("call", "says"),
     [
         (
-            lambda: ptcc.certify(Family.from_intervals([("a", "b", 1, 2)]), PROTOCOL, asks=ptcc.Asks(delta=1)),
-            "delta is not for families",
+            lambda: ptcc.certify(Family.from_intervals([("a", "b", 1, 2)]), PROTOCOL, asks=ptcc.Asks(at="0.5")),
+            "at is not for families",
         ),
         (
             lambda: ptcc.certify("fig1a", PROTOCOL, uncertainty="10%", asks=ptcc.Asks(method="lmi")),

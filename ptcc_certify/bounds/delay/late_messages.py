@@ -355,12 +355,12 @@ def late_rows(case: LateCase) -> FollowerRows:
 
 
 def _least(rows: FollowerRows, bounds: Sequence[np.ndarray]) -> np.ndarray | None:
-    """Return the least of bounds of followers, for all agents."""
+    """Return the least of bounds of followers, for all agents; None where some is beyond the range of floats."""
     if not bounds:
         return None
     whole = np.zeros(rows.n_nodes)
     whole[rows.followers] = np.minimum.reduce(bounds)
-    return whole
+    return whole if np.isfinite(whole).all() else None
 
 
 def late_obligations(late: LateBounds | None) -> Iterator[Obligation]:

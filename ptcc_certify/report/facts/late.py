@@ -109,7 +109,7 @@ def _tracking(late: LateBounds, leaders: MovingLeaders, at: Fraction | None) -> 
         return
     protocol, after = late.case.protocol, late.after or 0.0
     if (cap := late.messages.gain_cap) is not None:
-        yield Fact(head=head, note=f"gain <= {near(cap)}: under a cap nothing settles")
+        yield Fact(head=head, note=f"gain <= {near(cap)}{': under a cap nothing settles' if late.largest else ''}")
     where = f"within {up(late.largest, 2)} of its" if late.largest else "on its"
     then = f"within {up(after, 2)} of it from then on" if after else "and ever after"
     text = f"every follower {where} {goal} at T = {near(protocol.T)}, {then}"
@@ -138,11 +138,11 @@ def leaders_text(leaders: MovingLeaders) -> str:
     Examples
     --------
     >>> leaders_text(MovingLeaders(speed="0.5", disturbance=1))
-    "speed |x_j'| <= 0.5; any |d_k| <= 1"
+    "speed |x_j'| <= 0.5; any |d_k| <= 1 of followers"
     """
     clauses = [f"speed |x_j'| <= {near(leaders.speed)}" if leaders.speed else "at rest"]
     if leaders.disturbance > 0:
-        clauses.append(f"any |d_k| <= {near(leaders.disturbance)}")
+        clauses.append(f"any |d_k| <= {near(leaders.disturbance)} of followers")
     if leaders.sign_gain is not None:
         clauses.append(f"followers add {near(leaders.sign_gain)} sign(e_k)")
     return "; ".join(clauses)
