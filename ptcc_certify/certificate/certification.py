@@ -237,7 +237,7 @@ def _read_family(case: Case) -> Family:
     refuse_of_families(case)
     family = as_family(case.graph, uncertainty=case.uncertainty)
     if case.messages is not None or case.leaders is not None:
-        refuse_other_targets(family)
+        refuse_other_targets(family, "leaders that move" if case.messages is None else case.messages.asked)
     return family
 
 

@@ -296,24 +296,32 @@ def listeners(family: Family) -> np.ndarray:
     return np.unique(family.union[1])
 
 
-#: What of a family is proved row by row.
-_ASKED_OF_ROWS = "a gain cap, disturbances, noise, late messages, moving leaders and virtual positions"
+def refuse_other_targets(family: Family, asked: str = "late messages") -> None:
+    """Refuse a family of whose members the followers of leaders that are single nodes have no common targets.
 
+    Parameters
+    ----------
+    family : Family
+    asked : str
+        What is asked of it.
 
-def refuse_other_targets(family: Family) -> None:
-    """Refuse a family of whose members the followers of leaders that are single nodes have no common targets."""
+    Raises
+    ------
+    HypothesisError
+        Tells who hears whom, or that the targets depend on the signal.
+    """
     for component in decide(family):
         labels, kernel = component.family.labels, component.kernel
         if kernel is None or component.behaviour is None:
-            raise HypothesisError(
-                f"{_ASKED_OF_ROWS}: where agents are drawn to depends on the signal, of which nothing is proved yet"
-            )
+            where = "where the signal decides where agents are drawn to"
+            raise HypothesisError(f"with {asked} nothing is proved yet of families {where}; leave it out")
         heard = set(listeners(component.family).tolist())
         group = next((c for c in kernel.structure.closed_components if heard.intersection(c.nodes)), None)
         if group is not None:
+            leader = shorten(labels[group.nodes[0]])
             raise HypothesisError(
-                f"{_ASKED_OF_ROWS} of a family: leaders hear nobody in any mode; "
-                f"{shorten(labels[group.nodes[0]])} leads and hears others, of which nothing is proved yet"
+                f"with {asked} nothing is proved yet of families some of whose leaders hear others; "
+                f"{leader} leads and hears others: leave it out"
             )
 
 

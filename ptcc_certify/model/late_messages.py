@@ -189,6 +189,17 @@ lambda of L, or measure the own state without delay
         """What they are called: late messages, inexact ones, or both."""
         return f"{' and '.join(self.flaws) or 'late'} messages"
 
+    @property
+    def asked(self) -> str:
+        """What is asked by them, in words: late messages, virtual positions, leaders that move, or a cap alone."""
+        if not self.exact:
+            return self.name
+        if self.vehicles is not None:
+            return "vehicles that exchange virtual positions"
+        if self.leaders is not None and self.leaders.total:
+            return "leaders that move" if self.leaders.speed else "disturbances"
+        return "a gain cap"
+
     def latencies(self, of: SignedDigraph | Family) -> Fraction | tuple[Fraction, ...]:
         """Return what messages take: one number, or one for every ordered pair of an edge, in the order of these.
 

@@ -8,7 +8,6 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from ptcc_certify.bounds.delay.late_messages import LateBounds
 from ptcc_certify.certificate.assessment import CERTIFIED, OPEN, REFUTED
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.certificate_file import RejectedCertificate
@@ -137,18 +136,6 @@ def _write_statement(path: Path, drawn: Mapping[str, Any], latex: Callable[[dict
     write_atomically(path, text)
 
 
-def _asked_beside(late: LateBounds) -> str:
-    """Name what was asked beside the decay: late messages, leaders that move, disturbances, or a cap alone."""
-    messages, leaders = late.messages, late.leaders
-    if not messages.exact:
-        return messages.name
-    if messages.vehicles is not None:
-        return "vehicles that exchange virtual positions"
-    if leaders is not None and leaders.total:
-        return "leaders that move" if leaders.speed else "disturbances"
-    return "a gain cap"
-
-
 def _with_runs(saved: Certificate, simulation: bool | None) -> tuple[Certificate, list[Trajectory], str]:
     """Repeat the run of one graph, or make runs of a family under many signals; return why there is none."""
     n, of_family = len(saved.labels), saved.of_family
@@ -158,7 +145,7 @@ def _with_runs(saved: Certificate, simulation: bool | None) -> tuple[Certificate
     if saved.initial_state is None:
         return saved, [], "the certificate names no initial state"
     if of_family and saved.proof.late is not None:
-        return saved, [], f"with {_asked_beside(saved.proof.late)} none is made of a family"
+        return saved, [], f"with {saved.proof.late.messages.asked} none is made of a family"
     if simulation is None and n > most:
         return saved, [], f"above {most} agents it is {made} only where that is asked for"
     try:
