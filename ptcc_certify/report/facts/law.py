@@ -30,9 +30,10 @@ def beside_law(certificate: Certificate) -> list[str]:
         if messages.gain_cap is not None and messages.vehicles is None and not limits:
             limits = [Limits(gain_cap=messages.gain_cap)]
     if leaders is not None and (leaders.total or leaders.sign_gain is not None):
-        what = "leaders are at rest; of those that move was asked" if leaders.speed else "nothing disturbs; leaders are"
-        driven = "; followers move by x_k' = u_k + d_k" if leaders.disturbance > 0 else ""
-        told.append(f"Here {what}{':' if leaders.speed else ''} {leaders_text(leaders)}{driven}.")
+        rest = "leaders are at rest; of those that move was asked:"
+        driven = "; followers then move by x_k' = u_k + d_k" if leaders.disturbance > 0 else ""
+        what = rest if leaders.speed else "nothing disturbs; asked was: leaders"
+        told.append(f"Here {what} {leaders_text(leaders)}{driven}.")
     if certificate.noise is not None:
         told.append(f"With noise e_k is that of x + n, any |n_k| <= {near(certificate.noise)}.")
     if limits:
