@@ -82,7 +82,7 @@ def refuse_of_families(case: Case) -> None:
     given = [] if case.asks.method == "best" else ["method"]
     given += [name for name in NOT_OF_FAMILIES if (value := case.given(name)) is not None and value is not False]
     if given:
-        mend = {"limits": "of families takes one gain cap alone; leave others out", "delta": _NOT_LATE["delta"]}
+        mend = {"limits": "families take one gain cap alone; leave others out", "delta": _NOT_LATE["delta"]}
         text = "is not for families of graphs yet; leave it out, or certify one graph"
         raise ParameterError(given[0], mend.get(given[0], text))
     _refuse_beside_any_graph(case)

@@ -620,7 +620,7 @@ def test_the_answer_of_late_messages_tells_whose_speed_it_names():
             graph, NOMINAL, [1, 2, 3], messages=messages, leaders=leaders, asks=Asks(method="perron", simulation=False)
         )
         page = " ".join(re.sub("<[^>]*>", "", report_html(read_certificate(made.to_dict()))).split())
-        assert re.search(r"Leaders ?speed \|xj&#39;\| ≤ 0.5; any \|dk\| ≤ 0.2\.", page)
+        assert re.search(r"Leaders ?speed \|xj&#39;\| ≤ 0.5; any \|dk\| ≤ 0.2 of followers\.", page)
 
 
 def test_a_matrix_too_wide_for_a_column_of_two_is_a_list_of_weights(tmp_path: Path):
