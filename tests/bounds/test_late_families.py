@@ -335,7 +335,7 @@ def test_expectations_are_of_what_is_asked(words: dict[str, Any], code: int):
     ("family", "more", "why"),
     [
         ([("a", "b", 1, 2), ("b", "a", 1, 2), ("b", "c", 1, 2)], {}, "a leads and hears others"),
-        ([("a", "c", 1, 2), ("b", "c", 1, 2)], {}, "depends on the signal"),
+        ([("a", "c", 1, 2), ("b", "c", 1, 2)], {}, "where the signal decides"),
         ([("a", "b", 1, 2)], {"messages": LateMessages({("b", "a"): "0.1"})}, "no such edge"),
         ([("a", "b", 1, 2)], {"messages": LateMessages("0.1", own_delay=True, gain_cap=2)}, "own state"),
         ([("a", "b", 1, 2)], {"asks": Asks(expectations=Expectations(max_residual=1)), "messages": None}, "how late"),
