@@ -271,10 +271,10 @@ def test_agents_that_begin_on_their_targets_are_not_said_to_get_little_nearer(wo
             "under one gain cap alone; leave others out",
         ),
         (("team.csv", "--uncertainty", "1%", "--delay", "none"), 'no column "none"; add it, or name one of source'),
-        (("group.csv", "--uncertainty", "1%", "--delta", "1"), "a leads and hears others, of which nothing"),
+        (("group.csv", "--uncertainty", "1%", "--delta", "1"), "a leads and hears others: leave it out"),
         (
             ("group.csv", "--uncertainty", "1%", "--gain-cap", "9"),
-            "a leads and hears others, of which nothing",
+            "a leads and hears others: leave it out",
         ),
         (("team.csv", "--uncertainty", "1%", "--max-residual", "1"), "--max-residual is asked of late messages"),
         (("team.csv", "--delay", "1e"), "give a number in your unit of time, or the name of a column"),

@@ -32,8 +32,8 @@ def beside_law(certificate: Certificate) -> list[str]:
     if leaders is not None and (leaders.total or leaders.sign_gain is not None):
         rest = "leaders are at rest; of those that move was asked:"
         driven = "; followers then move by x_k' = u_k + d_k" if leaders.disturbance > 0 else ""
-        what = rest if leaders.speed else "nothing disturbs; asked was: leaders"
-        told.append(f"Here {what} {leaders_text(leaders)}{driven}.")
+        what = rest if leaders.speed else "nothing disturbs; asked was:"
+        told.append(f"Here {what} {leaders_text(leaders).removeprefix('at rest; ')}{driven}.")
     if certificate.noise is not None:
         told.append(f"With noise e_k is that of x + n, any |n_k| <= {near(certificate.noise)}.")
     if limits:
