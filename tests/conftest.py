@@ -54,9 +54,14 @@ def framed_figures(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def quick_search(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Certificates by closed forms where every class would be searched, for tests of all else: it takes a third."""
+def quick_search(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Certificates by closed forms where every class would be searched, for tests of all else: it takes a third.
+
+    With ``--all`` every class is searched.
+    """
     every = graph_certification.search_functions
+    if request.config.getoption("--all"):
+        return
 
     def closed_forms(system: Any, method: str, *more: Any) -> Any:
         return every(system, "perron" if method == "best" else method, *more)
