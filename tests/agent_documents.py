@@ -213,21 +213,21 @@ def of_graph(graph: SignedDigraph, s: Setting) -> Json:
         options["sigma0"] = [0] * graph.n_nodes
         options["x0"] = [0] * graph.n_nodes
     data = json.loads(certify_words(graph, protocol, simulation=False, method=s.method, **options).to_json())
-    data["protocol"]["rho1"] = str(s.rho1)
+    data["problem"]["gain"]["rho1"] = str(s.rho1)
     of_input = lambda step: step["kind"].startswith("input-") or step["of"].startswith("input")  # noqa: E731
     data["proof"] = [step for step in data["proof"] if not of_input(step)]
-    data |= {"initial_state": None, "final_state": None, "input": None, "unverified": {}}
-    if data["influence"] is not None:
-        data["influence"]["degenerate"] = None
-    for component in data.get("components") or ():
-        component["final_state"] = None
-    return data
+    data["problem"].pop("initial_state", None)
+    for of in (data, *data.get("components", ())):
+        of.pop("final_state", None)
+    data.pop("input", None)
+    data.get("influence", {}).pop("degenerate", None)
+    return {**data, "unverified": {}}
 
 
 def document(graph: SignedDigraph, s: Setting, seed: int = 0) -> Json:
     """A certificate of agents of order n on a graph."""
     rng, data = np.random.default_rng(seed), of_graph(graph, s)
-    labels, n, d = data["graph"]["nodes"], s.order, s.dimension
+    labels, n, d = data["problem"]["graph"]["nodes"], s.order, s.dimension
     draw = lambda *shape: rng.integers(-300, 301, shape)  # noqa: E731
     H = draw(len(labels), d) * s.offsets
     X = draw(len(labels), d, n)
@@ -236,8 +236,8 @@ def document(graph: SignedDigraph, s: Setting, seed: int = 0) -> Json:
         label: [[str(Fraction(int(x), 100)) for x in row] for row in rows]
         for label, rows in zip(labels, X, strict=True)
     }
-    used = [k for k, f in enumerate(data["lyapunov"]["functions"]) if Fraction(f["rate"]) > 0]
-    rates = [Fraction(data["lyapunov"]["functions"][k]["rate"]) for k in used]
+    used = [k for k, f in enumerate(data["decays"]) if Fraction(f["rate"]) > 0]
+    rates = [Fraction(data["decays"][k]["rate"]) for k in used]
     c = 1 / min(rates, default=ONE)
     W = [list(row) for row in lyapunov_matrix(replace(s, dimension=1, slides=False, method="paper", offsets=True))]
     P = inverse(W)
@@ -250,25 +250,25 @@ def document(graph: SignedDigraph, s: Setting, seed: int = 0) -> Json:
         "coupling": str(c),
         "lower_triangle": [[str(x) for x in row[: i + 1]] for i, row in enumerate(W)],
         "rate": str(s.rate),
-        "gain_cap": None if s.cap is None else str(s.cap),
         "points": list(map(str, s.points)),
-        "functions": [{"function": k, "inputs": inputs(data, k)} for k in used],
+        "functions": [{"function": k} | ({} if (own := inputs(data, k)) is None else {"inputs": own}) for k in used],
         "offsets": offsets,
-        "initial_state": states if s.start else None,
         "motion": motion(s),
-        "final_state": None,
-        "residual": None,
-        "input": None,
     }
+    if s.cap is not None:
+        agents["gain_cap"] = str(s.cap)
     data["agents"] = agents
     if s.start:
-        if data["influence"] is not None and data["influence"]["containment_weights"] is not None:
+        agents["initial_state"] = states
+        if "containment_weights" in data.get("influence", {}):
             agents["final_state"] = final_state(data)
-        agents["residual"] = residual(data, s)
-        agents["input"] = input_bound(data, s)
+        more = {"residual": residual(data, s), "input": input_bound(data, s)}
+        agents |= {key: x for key, x in more.items() if x is not None}
     data["proof"] += obligations(agents)
     data["verdict"] = (
-        "certified" if data["influence"] is not None and (used or not data["graph"]["edges"]) else "undecided"
+        "certified"
+        if "influence" in data and (used or not data["problem"]["graph"]["modes"][0]["edges"])
+        else "undecided"
     )
     return resealed(data)
 
@@ -276,9 +276,7 @@ def document(graph: SignedDigraph, s: Setting, seed: int = 0) -> Json:
 def obligations(agents: Json) -> list[Json]:
     """What the end of the proof lists."""
     kinds: list[tuple[str, str, Json]] = [
-        ("input-constants", f"lyapunov.functions[{entry['function']}]", {})
-        for entry in agents["functions"]
-        if entry["inputs"] is not None
+        ("input-constants", f"decays[{entry['function']}]", {}) for entry in agents["functions"] if "inputs" in entry
     ]
     kinds += [
         ("agent-positive", "agents", {}),
@@ -289,18 +287,18 @@ def obligations(agents: Json) -> list[Json]:
     kinds += [
         (f"agent-{key.replace('_', '-')}", "agents", {})
         for key in ("final_state", "residual", "input")
-        if agents[key] is not None
+        if key in agents
     ]
     return [
-        {"kind": kind, "of": of, "proves": OBLIGATIONS[kind][0], "lemma": OBLIGATIONS[kind][1], "numbers": numbers}
-        | {"witness": None}
+        {"kind": kind, "of": of, "proves": OBLIGATIONS[kind][0], "lemma": OBLIGATIONS[kind][1]}
+        | ({"numbers": numbers} if numbers else {})
         for kind, of, numbers in kinds
     ]
 
 
 def inputs(data: Json, k: int) -> Json | None:
     """Constants of the input of a full matrix: a little above the diagonal of its inverse."""
-    function = data["lyapunov"]["functions"][k]
+    function = data["decays"][k]
     if function["class"] != "full":
         return None
     (block,) = function["blocks"]
@@ -309,7 +307,7 @@ def inputs(data: Json, k: int) -> Json | None:
     least = dict(zip(block["nodes"], (row[i] for i, row in enumerate(inverse(P))), strict=True))
     return {
         label: str(Fraction(math.ceil(least[label] * 10**12 + 1), 10**12)) if label in least else "0"
-        for label in data["graph"]["nodes"]
+        for label in data["problem"]["graph"]["nodes"]
     }
 
 
@@ -317,7 +315,7 @@ def read_states(data: Json) -> list[list[Vector]]:
     """``xi_k(0) - (h_k, 0, ..)`` by agent, coordinate and derivative."""
     agents = data["agents"]
     found = []
-    for label in data["graph"]["nodes"]:
+    for label in data["problem"]["graph"]["nodes"]:
         pairs = zip(agents["initial_state"][label], agents["offsets"][label], strict=True)
         found.append([[number(x) - (number(h) if j == 0 else 0) for j, x in enumerate(row)] for row, h in pairs])
     return found
@@ -326,7 +324,7 @@ def read_states(data: Json) -> list[list[Vector]]:
 def final_state(data: Json) -> Json:
     agents, Q, G = data["agents"], Oracle(data, {}).Q, read_states(data)
     M = [[ends(x) for x in row] for row in agents["motion"]]
-    n, d, labels = agents["order"], agents["dimension"], data["graph"]["nodes"]
+    n, d, labels = agents["order"], agents["dimension"], data["problem"]["graph"]["nodes"]
     found: Json = {}
     for k, label in enumerate(labels):
         found[label] = []
@@ -348,7 +346,7 @@ def initial_value(data: Json, s: Setting, k: int) -> Fraction:
     n, d = s.order, s.dimension
     lower = [list(map(number, row)) for row in agents["lower_triangle"]]
     P = inverse([[lower[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)])
-    F, _, _, _ = oracle.form(data["lyapunov"]["functions"][k])
+    F, _, _, _ = oracle.form(data["decays"][k])
     total = ZERO
     for axis in range(d):
         Y = [[row[axis][j] / s.eta_0**j for j in range(n)] for row in G]
@@ -360,15 +358,15 @@ def initial_value(data: Json, s: Setting, k: int) -> Fraction:
 
 
 def residual(data: Json, s: Setting) -> Json | None:
-    functions = data["lyapunov"]["functions"]
-    used = [e["function"] for e in data["agents"]["functions"] if functions[e["function"]]["deviation"] is not None]
+    functions = data["decays"]
+    used = [e["function"] for e in data["agents"]["functions"] if "deviation" in functions[e["function"]]]
     if s.cap is None or not used:
         return None
     values = {k: initial_value(data, s, k) for k in used}
     clock = Fraction(float(limited_clock(s)) * (1 - 1e-12))
     W, found = lyapunov_matrix(replace(s, dimension=1, slides=False, method="paper", offsets=True)), {}
     decay = Fraction(math.exp(-float(s.rate * clock)) * (1 + 1e-12))
-    for label in data["graph"]["nodes"]:
+    for label in data["problem"]["graph"]["nodes"]:
         least = min(number(functions[k]["deviation"]["agents"][label]) * values[k] for k in used)
         found[label] = [above(s.cap ** (2 * i) * W[i][i] * least * decay) for i in range(s.order)]
     return {"clock": str(clock), "agents": found}
@@ -386,9 +384,9 @@ def limited_clock(s: Setting) -> float:
 def error_constants(data: Json, k: int) -> Sequence[Fraction] | None:
     """``c_k^E`` of a Lyapunov function."""
     entry = next(e for e in data["agents"]["functions"] if e["function"] == k)
-    function, labels = data["lyapunov"]["functions"][k], data["graph"]["nodes"]
+    function, labels = data["decays"][k], data["problem"]["graph"]["nodes"]
     if function["class"] == "full":
-        return None if entry["inputs"] is None else [number(entry["inputs"][label]) for label in labels]
+        return [number(entry["inputs"][label]) for label in labels] if "inputs" in entry else None
     oracle = Oracle(data, {})
     _, P, _, nodes = oracle.form(function)
     weight = {v: P[i][i] for i, v in enumerate(nodes)}
@@ -398,7 +396,7 @@ def error_constants(data: Json, k: int) -> Sequence[Fraction] | None:
 
 
 def input_bound(data: Json, s: Setting) -> Json | None:
-    agents, labels = data["agents"], data["graph"]["nodes"]
+    agents, labels = data["agents"], data["problem"]["graph"]["nodes"]
     known = {e["function"]: c for e in agents["functions"] if (c := error_constants(data, e["function"])) is not None}
     large = s.rate * s.k >= 2 * s.order
     if not known or (s.cap is None and not large):
@@ -420,14 +418,14 @@ def input_bound(data: Json, s: Setting) -> Json | None:
 
 def damping_bound(data: Json, s: Setting) -> list[Fraction] | None:
     """Bound ``f_2 eta |x_k'|`` by its value at 0, of agents that meet at rest."""
-    agents, functions, oracle = data["agents"], data["lyapunov"]["functions"], Oracle(data, {})
-    used = [e["function"] for e in agents["functions"] if functions[e["function"]]["deviation"] is not None]
+    agents, functions, oracle = data["agents"], data["decays"], Oracle(data, {})
+    used = [e["function"] for e in agents["functions"] if "deviation" in functions[e["function"]]]
     falls = s.damping * s.k >= 1 and s.a[1] + (s.damping - 1 / s.k) * s.eta_0 >= 0
-    if not used or not falls or agents["final_state"] is None:
+    if not used or not falls or "final_state" not in agents:
         return None
     values, G, found = {k: initial_value(data, s, k) for k in used}, read_states(data), []
     w = number(agents["lower_triangle"][1][1])
-    for v, label in enumerate(data["graph"]["nodes"]):
+    for v, label in enumerate(data["problem"]["graph"]["nodes"]):
         least = min(number(functions[k]["deviation"]["agents"][label]) * values[k] for k in used)
         speeds = [
             sum((q * row[axis][1] for q, row in zip(oracle.Q[v], G, strict=True)), ZERO) for axis in range(s.dimension)

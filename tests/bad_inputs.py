@@ -289,7 +289,7 @@ OPTIONS = [
     BadInput("missing certificate", ("check", "nowhere.json"), "nowhere.json: not a readable certificate"),
     BadInput("certificate that is a folder", ("check", "c.json"), "is a folder", (("c.json", _folder),)),
     BadInput("certificate cut short", ("check", "c.json"), "not a readable", (("c.json", '{"schema": "ptcc-'),)),
-    BadInput("another schema", ("check", "c.json"), "ptcc-certificate/2", (("c.json", '{"schema": "x/9"}'),)),
+    BadInput("another schema", ("check", "c.json"), "ptcc-certificate/3", (("c.json", '{"schema": "x/9"}'),)),
     BadInput("a graph for a certificate", ("check", "g.csv"), "not a readable certificate", _PAIR),
     BadInput("no graph", ("certify",), "GRAPH"),
     BadInput("unknown command", ("predict", "fig1b"), "predict"),

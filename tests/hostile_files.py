@@ -10,15 +10,29 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from mutations import Json, at, changed, containers, leaves, resealed
+from mutations import EDGES, Json, at, changed, containers, leaves, part_of, resealed
 from random_mutants import Rng, fraction, pick, with_hash
 
 from ptcc_certify.checker.obligations import OBLIGATIONS
 
 READ = {"orientation": "information", "duplicates": "refused", "self_loops": "refused", "undirected": False}
 
+GAIN = {"kind": "nominal", "T": "1", "rho1": "1", "rho2": "1", "kappa": "2"}
+
 #: Text from which a file is put together without keeping the whole.
 Parts = list[bytes]
+
+
+def left_out(data: Json, *keys: str) -> Json:
+    """Without some parts."""
+    return {key: x for key, x in data.items() if key not in keys}
+
+
+def with_graph(data: Json, nodes: list[str]) -> Json:
+    """With other nodes, and without edges."""
+    graph = data["problem"]["graph"]
+    modes = [{**mode, "edges": []} for mode in graph["modes"]]
+    return {**data, "problem": {**data["problem"], "graph": {**graph, "nodes": nodes, "modes": modes}}}
 
 
 def dumped(data: Json) -> bytes:
@@ -86,9 +100,9 @@ def deep(rng: Rng, data: Json, files: dict[str, bytes]) -> Parts:
 def long_numbers(rng: Rng, data: Json, files: dict[str, bytes]) -> Parts:
     """Long numbers in place of one of so many, in a part or everywhere."""
     share, digits = 10 ** rng.uniform(-2, 0), int(10 ** rng.uniform(1, 3.58))
-    key = pick(rng, [None, "graph", "lyapunov", "final_state", "proof", "input", "protocol", "initial_state", "paper"])
+    key = pick(rng, [None, "graph", "decays", "final_state", "proof", "input", "gain", "initial_state", "paper"])
     for path, value in list(leaves(data)):
-        if fraction(value) is not None and (key is None or path[0] == key) and rng.random() < share:
+        if fraction(value) is not None and (key is None or part_of(path) == key) and rng.random() < share:
             data = changed(data, path, long_text(rng, digits))
     with contextlib.suppress(KeyError, TypeError, ValueError):
         data = with_hash(data)
@@ -113,12 +127,13 @@ def labels(rng: Rng, data: Json, files: dict[str, bytes]) -> Parts:
         n = int(10 ** rng.uniform(2, 5.3))
         nodes = [f"{k}" for k in range(n)]
         closed = [{"nodes": [x], "balanced": True, "gauge": [1]} for x in nodes] if rng.random() < 0.5 else []
-        data = {**data, "graph": {**data["graph"], "nodes": nodes, "edges": []}}
-        data = {**data, "structure": {**data["structure"], "closed_components": closed, "leaders": nodes}}
+        data = with_graph(data, nodes)
+        structure = {**data["structure"][0], "closed_components": closed, "leaders": nodes}
+        data = {**data, "structure": [structure, *data["structure"][1:]]}
         return [dumped(resealed(with_hash(data)))]
     long = pick(rng, ["x", "\U0001f600", "\x01", "\x7f", "é"]) * int(10 ** rng.uniform(2, 6.5))
-    nodes = [long, *data["graph"]["nodes"][1:]]
-    return [dumped(changed(data, ("graph", "nodes"), nodes))]
+    nodes = [long, *data["problem"]["graph"]["nodes"][1:]]
+    return [dumped(changed(data, ("problem", "graph", "nodes"), nodes))]
 
 
 def star(rng: Rng, data: Json, files: dict[str, bytes]) -> Parts:
@@ -131,12 +146,12 @@ def star(rng: Rng, data: Json, files: dict[str, bytes]) -> Parts:
     weights = {k: long_text(rng, digits) for k in rng.integers(len(ends), size=int(rng.choice([0, 0, 5]))).tolist()}
     nodes = [str(k) for k in range(n)]
     edges = [[str(i), str(j), weights.get(k, "1")] for k, (i, j) in enumerate(ends)]
-    graph = {"nodes": nodes, "edges": edges, "read": data["graph"]["read"], "sha256": ""}
+    graph = {"nodes": nodes, "modes": [{"edges": edges}], "read": READ, "sha256": ""}
     lower = [["1" if rng.random() < 0.5 else "2"] * i + [str(4 * n)] for i in range(n)]
     for _ in range(few):
         i = int(rng.integers(n))
         lower[i][int(rng.integers(i + 1))] = long_text(rng, digits)
-    with_graph = with_hash({"graph": graph})["graph"]
+    problem = with_hash({"problem": {"graph": graph, "gain": GAIN}})["problem"]
     structure = {
         "connectivity": "strong" if dense else "quasi-strong",
         "closed_components": [
@@ -158,30 +173,21 @@ def star(rng: Rng, data: Json, files: dict[str, bytes]) -> Parts:
         "class": "full" if kind == "full" else "lmi",
         "coordinates": "E",
         "blocks": [{**block, **shape}],
-        "rho": None,
+        "rate": pick(rng, ["1/2", "-9", long_text(rng, digits)]),
+        "overshoot": "1",
     }
-    function |= {"rate": pick(rng, ["1/2", "-9", long_text(rng, digits)]), "overshoot": "1", "deviation": None}
     steps = [s for s in data["proof"] if s["kind"] in ("structure", "claim")]
     stated = {"proves": "P L + L'P - b P > 0 on the range of L", "lemma": "Lyapunov decrease"}
-    steps.append(
-        {"kind": "rate", "of": "lyapunov.functions[0]", **stated, "numbers": {"b": function["rate"]}, "witness": None}
-    )
+    steps.append({"kind": "rate", "of": "decays[0]", **stated, "numbers": {"b": function["rate"]}})
     data = {
         **data,
-        "graph": with_graph,
-        "structure": structure,
+        "problem": problem,
+        "structure": [structure],
         "claim": {"theorem": row[0], "behaviour": row[1], "corollaries": corollaries},
-        "protocol": {"kind": "nominal", "T": "1", "rho1": "1", "rho2": "1", "kappa": "2"},
-        "paper": None,
-        "lyapunov": {"functions": [function] * int(rng.choice([1, 1, 5]))},
-        "initial_state": None,
-        "sliding_variable": None,
-        "influence": None,
-        "final_state": None,
-        "reaching_time": None,
+        "decays": [function] * int(rng.choice([1, 1, 5])),
         "proof": steps,
     }
-    data.pop("components", None)
+    data = left_out(data, "paper", "influence", "final_state", "reaching_time", "components")
     if rng.random() < 0.6:
         data = with_influence(rng, data, digits)
     return [dumped(resealed(data))]
@@ -205,9 +211,9 @@ def lying(rng: Rng, data: Json, files: dict[str, bytes]) -> Parts:
         if "count" in said:
             new["count"] = pick(rng, [said["count"], count, size, 10**18 - 1])
         data = changed(data, path, new)
-    edges = data["graph"]["edges"]
+    edges = data["problem"]["graph"]["modes"][0]["edges"]
     if isinstance(edges, dict) and rng.random() < 0.3:
-        data = changed(data, ("graph", "edges", "count"), int(10 ** rng.uniform(0, 15)))
+        data = changed(data, (*EDGES, "count"), int(10 ** rng.uniform(0, 15)))
     return [dumped(resealed(data))]
 
 
@@ -230,29 +236,30 @@ def factors(rng: Rng, data: Json, files: dict[str, bytes]) -> Parts:
 
 def instants(rng: Rng, data: Json, files: dict[str, bytes]) -> Parts:
     """Sliding variables of many agents, all with reaching times of their own, and extreme gains."""
-    if data["reaching_time"] is None:
+    if "reaching_time" not in data:
         return long_numbers(rng, data, files)
     digits = int(10 ** rng.uniform(0.7, 3.5))
     gains = pick(rng, [["1900", "40"], ["1/1000000", "1/3"], [long_text(rng, digits), long_text(rng, digits)]])
-    data = changed(data, ("protocol",), {**data["protocol"], "mu2": gains[0], "mu3": gains[1]})
-    z = {label: long_text(rng, digits) for label in data["graph"]["nodes"]}
+    data = changed(data, ("problem", "gain"), {**data["problem"]["gain"], "mu2": gains[0], "mu3": gains[1]})
+    z = {label: long_text(rng, digits) for label in data["problem"]["graph"]["nodes"]}
     return [dumped(resealed(changed(data, ("reaching_time", "z"), z)))]
 
 
 def with_influence(rng: Rng, data: Json, digits: int) -> Json:
     """With left null vectors and weights of followers, whatever these are, and an initial state: not undecided."""
-    nodes, structure = data["graph"]["nodes"], data["structure"]
+    nodes, structure = data["problem"]["graph"]["nodes"], data["structure"][0]
     groups = [c for c in structure["closed_components"] if c["balanced"]]
     long = lambda: long_text(rng, digits) if rng.random() < 0.1 else "1"  # noqa: E731
     vectors = [{"nodes": c["nodes"], "left_null_vector": [long() for _ in c["nodes"]]} for c in groups]
     weights = {label: [long() for _ in groups] for label in structure["followers"]}
     begin = {label: long() for label in nodes}
-    step = {"kind": "final-state", "of": "graph", "numbers": {}, "witness": None}
+    step = {"kind": "final-state", "of": "graph"}
     step |= {"proves": "L Q = 0 and Q(x - sigma) is kept, so the agents end at Q(X(0) - sigma(0))"}
     step |= {"lemma": "Lemmas 2, 8 and 9"}
     proof = [*data["proof"][:2], step, *data["proof"][2:]]
     influence = {"components": vectors, "containment_weights": weights, "degenerate": []}
-    return {**data, "influence": influence, "initial_state": begin, "final_state": begin, "proof": proof}
+    problem = {**data["problem"], "initial_state": begin}
+    return {**data, "problem": problem, "influence": influence, "final_state": begin, "proof": proof}
 
 
 @cache
@@ -287,7 +294,7 @@ def collisions(rng: Rng, data: Json, files: dict[str, bytes]) -> Parts:
         texts = ["x" * 3900 + f"{k}" for k in range(5000)]
     if rng.random() < 0.6:
         return [dumped({**data, "unverified": dict.fromkeys(texts, 0)})]
-    data = {**data, "graph": {**data["graph"], "nodes": texts, "edges": []}}
+    data = with_graph(data, texts)
     with contextlib.suppress(KeyError, TypeError, ValueError):
         data = with_hash(data)
     return [dumped(resealed(data))]
@@ -314,43 +321,45 @@ def sparse(rng: Rng, data: Json, files: dict[str, bytes]) -> Parts:
     lower = [[entry(i, j) for j in range(i + 1)] for i in range(min(rows, n - 1))]
     block = {"name": "P", "nodes": own, "times_rho": False}
     shape = {"lower_triangle": lower} if rng.random() < 0.7 else {"diagonal": [row[-1] for row in lower]}
-    function = {"class": "full" if "lower_triangle" in shape else "lmi", "coordinates": "E", "rho": None}
-    function |= {"blocks": [{**block, **shape}], "rate": "1", "overshoot": "1", "deviation": None}
-    steps = [("structure", "graph", {}), ("claim", "graph", {}), ("final-state", "graph", {})]
-    steps += [("rate", "lyapunov.functions[0]", {"b": "1"})]
-    steps += [("overshoot", "lyapunov.functions[0]", {"lowest": "1", "highest": "1"})] * ("lower_triangle" in shape)
-    proof = [{"kind": kind, "of": of, "numbers": values, "witness": None} for kind, of, values in steps]
+    function = {"class": "full" if "lower_triangle" in shape else "lmi", "coordinates": "E"}
+    function |= {"blocks": [{**block, **shape}], "rate": "1", "overshoot": "1"}
+    steps = [("structure", "graph.modes[0]", {}), ("claim", "graph", {}), ("final-state", "graph", {})]
+    steps += [("rate", "decays[0]", {"b": "1"})]
+    steps += [("overshoot", "decays[0]", {"lowest": "1", "highest": "1"})] * ("lower_triangle" in shape)
+    proof = [{"kind": kind, "of": of} | ({"numbers": values} if values else {}) for kind, of, values in steps]
+    edges = [["0", x, "1"] for x in own]
+    graph = {"nodes": nodes, "modes": [{"edges": edges}], "read": READ, "sha256": ""}
     data = {
         **data,
-        "graph": {"nodes": nodes, "edges": [["0", x, "1"] for x in own], "read": READ, "sha256": ""},
-        "structure": {
-            **{"connectivity": "quasi-strong", "balanced": True, "sign_symmetric": True},
-            **{"closed_components": [{"nodes": ["0"], "balanced": True, "gauge": [1]}], "leaders": ["0"]},
-            "followers": own,
-        },
+        "problem": {"graph": graph, "gain": GAIN},
+        "structure": [
+            {
+                **{"connectivity": "quasi-strong", "balanced": True, "sign_symmetric": True},
+                **{"closed_components": [{"nodes": ["0"], "balanced": True, "gauge": [1]}], "leaders": ["0"]},
+                "followers": own,
+            }
+        ],
         "claim": {"theorem": "2.1", "behaviour": "interval bipartite consensus", "corollaries": ["3", "4"]},
-        "protocol": {"kind": "nominal", "T": "1", "rho1": "1", "rho2": "1", "kappa": "2"},
-        "lyapunov": {"functions": [function] * int(rng.choice([1, 3]))},
-        "rates": {"paper": None, "diagonal": None, "proved": "1", "upper_bound": None},
+        "decays": [function] * int(rng.choice([1, 3])),
+        "rates": {"proved": "1"},
         "overshoot": {"value": "1", "of": "||E||^2"},
         "influence": {
             "components": [{"nodes": ["0"], "left_null_vector": ["1"]}],
-            **{"containment_weights": {x: ["1"] for x in own}, "degenerate": None},
+            **{"containment_weights": {x: ["1"] for x in own}},
         },
-        **dict.fromkeys(("paper", "initial_state", "sliding_variable", "final_state", "reaching_time")),
         "proof": [{**step, **dict(zip(("proves", "lemma"), OBLIGATIONS[step["kind"]], strict=True))} for step in proof],
     }
-    data.pop("components", None)
+    data = left_out(data, "paper", "final_state", "reaching_time", "components")
     return [dumped(resealed(with_hash(data)))]
 
 
 def nearly(rng: Rng, data: Json, files: dict[str, bytes]) -> Parts:
     """Numbers that are longer, and nearly the same: what rests on them is formed, and nearly holds."""
     digits, share = int(10 ** rng.uniform(1, 3.2)), 10 ** rng.uniform(-2, 0)
-    key = pick(rng, ["lyapunov", "lyapunov", "influence", "final_state", "initial_state", "graph", "proof", "paper"])
+    key = pick(rng, ["decays", "decays", "influence", "final_state", "initial_state", "graph", "proof", "paper"])
     common = 10**digits + int(rng.integers(10**9))
     same = rng.random() < 0.5
-    for path, text in [p for p in leaves(data) if p[0][0] == key and "sha256" not in p[0]]:
+    for path, text in [p for p in leaves(data) if part_of(p[0]) == key and "sha256" not in p[0]]:
         value = fraction(text)
         if value and rng.random() < share:
             q = common + (0 if same else int(rng.integers(10**9)))
@@ -362,19 +371,19 @@ def nearly(rng: Rng, data: Json, files: dict[str, bytes]) -> Parts:
 
 def modes(rng: Rng, data: Json, files: dict[str, bytes]) -> Parts:
     """A family of very many modes, or of modes with many edges; of other certificates many of everything."""
-    if "modes" not in data["graph"]:
+    if "signal" not in data["problem"]:
         return many(rng, data, files)
     count = int(10 ** rng.uniform(1, 3.6))
-    kinds, structure = data["graph"]["modes"], data["structure"]["modes"]
+    kinds, structure = data["problem"]["graph"]["modes"], data["structure"]
     new = [{**kinds[k % len(kinds)], "name": f"m{k}"} for k in range(count)]
-    data = changed(data, ("graph", "modes"), new)
-    data = changed(data, ("structure", "modes"), [structure[k % len(kinds)] for k in range(count)])
+    data = changed(data, ("problem", "graph", "modes"), new)
+    data = changed(data, ("structure",), [structure[k % len(kinds)] for k in range(count)])
     step = next(s for s in data["proof"] if s["kind"] == "structure")
     steps = [{**step, "of": f"graph.modes[{k}]"} for k in range(count)]
     rates = [s for s in data["proof"] if s["kind"] == "family-rate"]
     steps += [s for s in data["proof"] if s["kind"] not in ("structure", "family-rate")]
     for k in range(count if rates else 0):
-        steps.append({**rates[0], "of": f"lyapunov.functions[0].modes[{k}]"})
+        steps.append({**rates[0], "of": f"decays[0].modes[{k}]"})
     return [dumped(resealed(with_hash({**data, "proof": steps})))]
 
 

@@ -99,12 +99,12 @@ class Late:
 
     def __init__(self, data: Json, latencies: Sequence[Fraction] = (), delay: Fraction = Fraction(0)):
         self.data = data
-        self.labels = data["graph"]["nodes"]
+        self.labels = data["problem"]["graph"]["nodes"]
         index = {label: v for v, label in enumerate(self.labels)}
-        self.edges = [(index[s], index[t], number(w)) for s, t, w in data["graph"]["edges"]]
+        self.edges = [(index[s], index[t], number(w)) for s, t, w in data["problem"]["graph"]["modes"][0]["edges"]]
         self.followers = sorted({t for _, t, _ in self.edges})
         self.D = {v: sum((abs(w) for _, t, w in self.edges if t == v), Fraction(0)) for v in range(len(self.labels))}
-        g = {key: number(x) for key, x in data["protocol"].items() if key not in ("kind", "disturbance")}
+        g = {key: number(x) for key, x in data["problem"]["gain"].items() if key not in ("kind", "disturbance")}
         self.T = g["T"] if "T" in g else g["T_r"] + g["T_s"]
         self.rho1, self.k = g["rho1"], g["rho2"] * g["kappa"]
         # ages of what is heard, by source and listener, in 64ths of the largest one, rounded up
@@ -126,10 +126,10 @@ class Late:
 
     def away(self, v: int) -> Fraction:
         """What an agent is away from its final state at most."""
-        if self.data["final_state"] is None:
+        if "final_state" not in self.data:
             return Fraction(1)
         mid, radius = self.interval(v)
-        return abs(number(self.data["initial_state"][self.labels[v]]) - mid) + radius
+        return abs(number(self.data["problem"]["initial_state"][self.labels[v]]) - mid) + radius
 
     def power(self, q: Fraction, s: int, v: int) -> Fraction:
         """``q`` to the power of the age of what is heard over an edge, a little above."""
@@ -192,7 +192,7 @@ class Late:
         if "after" in entry:
             first = min(self.rho1 + self.k / self.T, gain_cap)
             floor += number(entry["after"]) * min(self.rho1, gain_cap) / first
-        y = self.largest_gain(b, gain_cap, None if entry["cap"] is None else number(entry["cap"]))
+        y = self.largest_gain(b, gain_cap, number(entry["cap"]) if "cap" in entry else None)
         for v in range(len(self.labels)):
             if v not in u:
                 found.append(Fraction(0))
@@ -235,13 +235,9 @@ class Late:
         initial = max(self.away(v) / u[v] for v in self.followers)
         slack = {v: self.D[v] * u[v] - sum((w * u[s] for s, w in self.heard[v]), Fraction(0)) for v in self.followers}
         floor = max(error * self.D[v] / slack[v] for v in self.followers)
-        entry = {
-            "cap": text(cap),
-            "clock": text(clock),
-            "left": text(left),
-            "initial": text(initial),
-            "floor": text(floor),
-        }
+        known = present({"cap": cap, "clock": clock})
+        known |= {"left": left, "initial": initial, "floor": floor}
+        entry = {key: text(x) for key, x in known.items()}
         drift = Fraction(0)
         if push is not None:
             drift = push / min(u.values()) * self.integral(b, limit)
@@ -321,7 +317,9 @@ class Late:
             s = self.rho1 * t + self.k * log(self.T / (self.T - t))[1] if t else Fraction(0)
             for v, w in self.heard[agent]:
                 mid, radius = self.interval(v)
-                size = max(abs(number(self.data["initial_state"][self.labels[v]]) - mid) - radius, Fraction(0))
+                size = max(
+                    abs(number(self.data["problem"]["initial_state"][self.labels[v]]) - mid) - radius, Fraction(0)
+                )
                 total += w / self.D[agent] * exp(-self.D[v] * s)[0] * size
             if total > 0 and (best is None or total > best[0]):
                 best = total, agent, gauge
@@ -347,7 +345,7 @@ class Late:
             again = any(s == agent for v in gauge for s, _ in self.heard[v])
             for v, g in gauge.items():
                 mid, radius = self.interval(v)
-                off = g * (number(self.data["initial_state"][self.labels[v]]) - mid)
+                off = g * (number(self.data["problem"]["initial_state"][self.labels[v]]) - mid)
                 fits &= off >= radius or (v == agent and not again)
             if fits:
                 return gauge
@@ -371,11 +369,11 @@ class Late:
         self, delay: Fraction, gain_cap: Fraction, late: bool, k: int, share: Fraction
     ) -> tuple[Json, Json] | None:
         """The part ``form`` with ``b`` a share of half the rate; its obligation without ``of``."""
-        function = self.data["lyapunov"]["functions"][k]
+        function = self.data["decays"][k]
         n, place = len(self.labels), {label: v for v, label in enumerate(self.labels)}
-        if function["deviation"] is None or function["coordinates"] != "E" or "diagonal" not in function["blocks"][0]:
+        if "deviation" not in function or function["coordinates"] != "E" or "diagonal" not in function["blocks"][0]:
             return None
-        rho = number(function["rho"]) if function["rho"] is not None else Fraction(1)
+        rho = number(function.get("rho", "1"))
         P = {
             place[label]: number(x) * (rho if block["times_rho"] else 1)
             for block in function["blocks"]
@@ -403,7 +401,7 @@ class Late:
         kap = sqrt(value)[1] * (1 + ROOM)
         if b + h * q * kap > r / 2:
             return None
-        x0 = [number(self.data["initial_state"][label]) for label in self.labels]
+        x0 = [number(self.data["problem"]["initial_state"][label]) for label in self.labels]
         E = [sum((a * x for a, x in zip(row, x0, strict=True)), Fraction(0)) for row in L]
         root = sqrt(sum((P[v] * E[v] ** 2 for v in P), Fraction(0)))[1]
         left = exp(-b * self.clock(gain_cap))[1] * (1 + ROOM)
@@ -426,13 +424,19 @@ class Late:
         return {label: text(x) for label, x in zip(self.labels, values, strict=True)}
 
 
-def text(x: Any) -> Any:
-    return None if x is None else str(Fraction(x))
+def text(x: Any) -> str:
+    return str(Fraction(x))
+
+
+def present(said: Json) -> Json:
+    """Without what is None: a part that is absent has no key."""
+    return {key: x for key, x in said.items() if x is not None}
 
 
 def obligation(kind: str, of: str, numbers: Json | None = None, witness: Any = None) -> Json:
     proves, lemma = OBLIGATIONS[kind]
-    return {"kind": kind, "of": of, "proves": proves, "lemma": lemma, "numbers": numbers or {}, "witness": witness}
+    told = {"kind": kind, "of": of, "proves": proves, "lemma": lemma}
+    return told | present({"numbers": numbers or None, "witness": witness})
 
 
 def with_messages(
@@ -464,22 +468,16 @@ def with_messages(
     error, cap = Fraction(value_error), None if gain_cap is None else Fraction(gain_cap)
     said: Json = {
         "latency": [text(x) for x in latency] if isinstance(latency, list) else text(latency),
-        "packets": packets,
+        **present({"packets": packets}),
         "delay": text(delay),
         "own": "late" if late else "fresh",
         "value_error": text(error),
-        "gain_cap": text(cap),
-        "leaders": moving and {"speed": text(moving[0]), "disturbance": text(moving[1])},
         "rows": [],
-        "steps": None,
-        "residual": None,
-        "missed": None,
-        "staged": None,
-        "settling": None,
-        "form": None,
-        "lmi": None,
-        "input": None,
     }
+    if cap is not None:
+        said["gain_cap"] = text(cap)
+    if moving is not None:
+        said["leaders"] = {"speed": text(moving[0]), "disturbance": text(moving[1])}
     proof, bounds, inputs, push, sign = [], [], [], None, Fraction(0)
     if moving is not None:
         push = Fraction(moving[0]) + Fraction(moving[1])
@@ -514,7 +512,7 @@ def with_messages(
         said["staged"] = {case.labels[v]: text(case.T - (last - levels[v]) * delay) for v in case.followers}
         proof.append(obligation("late-staged", "messages.staged"))
     if form is not None and cap is not None:
-        for k in range(len(data["lyapunov"]["functions"])):
+        for k in range(len(data["decays"])):
             if (found := case.form(delay, cap, late, k, form)) is not None:
                 said["form"] = found[0]
                 proof.append(obligation("late-form", "messages.form", found[1]["numbers"], found[1]["witness"]))

@@ -8,14 +8,25 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
+from functools import cache
 from typing import Any
 
 import numpy as np
 
+from ptcc_certify.certificate.json_schema import json_schema
 from ptcc_certify.checker import check, digest
 
 Path = tuple[str | int, ...]
 Json = dict[str, Any]
+
+#: Where the graph stands, and the edges of one fixed graph.
+GRAPH: Path = ("problem", "graph")
+EDGES: Path = (*GRAPH, "modes", 0, "edges")
+
+
+def part_of(path: Path) -> str | int:
+    """The part of a certificate that a path leads into, or the part of its problem."""
+    return path[1] if path[0] == "problem" and len(path) > 1 else path[0]
 
 
 def leaves(value: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
@@ -50,8 +61,37 @@ def changed(data: Json, path: Path, new: Any) -> Json:
     if not path:
         return new
     result: Any = copy.copy(data)
-    result[path[0]] = changed(data[path[0]], path[1:], new)
+    result[path[0]] = changed(data[path[0]], path[1:], new) if path[1:] else new
     return result
+
+
+def without(data: Json, path: Path) -> Json:
+    """A copy of ``data`` without a key that is there."""
+    *inside, key = path
+    part = dict(at(data, tuple(inside)))
+    del part[key]
+    return changed(data, tuple(inside), part)
+
+
+@cache
+def sections() -> list[tuple[set[str], set[str]]]:
+    """The keys that every kind of section must have, and those that it may have."""
+    found, todo = [], [json_schema()]
+    for part in todo:
+        if isinstance(part, dict) and part.get("additionalProperties") is False:
+            found.append((set(part["required"]), set(part["properties"])))
+        todo += part.values() if isinstance(part, dict) else part if isinstance(part, list) else ()
+    return found
+
+
+def of_keys(value: Any) -> list[tuple[str, Any]]:
+    """A section without a key that may be absent, or with one that is; and the key."""
+    if not isinstance(value, dict):
+        return []
+    fit = [(needed, known) for needed, known in sections() if needed <= set(value) <= known]
+    free = sorted({key for needed, known in fit for key in known - needed})
+    less = [(key, {k: x for k, x in value.items() if k != key}) for key in free if key in value]
+    return less + [(key, {**value, key: x}) for key in free if key not in value for x in ("1", {}, 0, None)]
 
 
 def of_leaf(value: Any, labels: list[str], long: bool) -> list[Any]:
@@ -99,7 +139,7 @@ def of_container(value: Any) -> list[Any]:
 
 def mutants(data: Json, every: int = 1, start: int = 0, long: bool = False) -> Iterator[tuple[Path, Json]]:
     """Single changes: of every leaf and of every container, one of ``every`` from ``start`` on."""
-    labels, count = data["graph"]["nodes"], start
+    labels, count = data["problem"]["graph"]["nodes"], start
     for path, value in leaves({k: v for k, v in data.items() if k not in ("unverified", "digest")}):
         for new in of_leaf(value, labels, long):
             count += 1
@@ -111,6 +151,11 @@ def mutants(data: Json, every: int = 1, start: int = 0, long: bool = False) -> I
                 count += 1
                 if count % every == 0:
                     yield path, changed(data, path, new)
+    for path in containers(data):
+        for key, new in of_keys(at(data, path)):
+            count += 1
+            if count % every == 0:
+                yield (*path, key), changed(data, path, new)
 
 
 def without_instants(data: Json) -> Json:
@@ -150,7 +195,7 @@ def nudged(
 ) -> Iterator[tuple[Any, Json]]:
     """Numbers of some parts, a little larger or smaller or of the other sign; ``again`` tells them once more."""
     rng = np.random.default_rng(seed)
-    places = [(path, x) for path, x in leaves(data) if path[0] in parts]
+    places = [(path, x) for path, x in leaves(data) if part_of(path) in parts]
     places = [(path, x) for path, x in places if isinstance(x, str) and re.fullmatch(r"-?[0-9./]+", x)]
     for _ in range(count):
         path, text = places[int(rng.integers(len(places)))]

@@ -105,11 +105,11 @@ class Oracle:
 
     def __init__(self, data: Json, files: Mapping[str, bytes]):
         self.data, self.files, self.false = data, files, list[str]()
-        said = data["graph"]
+        said = data["problem"]["graph"]
         self.labels: list[str] = said["nodes"]
         self.index = {label: i for i, label in enumerate(self.labels)}
         self.n = len(self.labels)
-        self.weights = {(s, t): w for s, t, w in self.edges(said["edges"])}
+        self.weights = {(s, t): w for s, t, w in self.edges(said["modes"][0]["edges"])}
         self.L = [[-self.weights.get((j, i), Fraction(0)) for j in range(self.n)] for i in range(self.n)]
         for i, row in enumerate(self.L):
             row[i] = sum(map(abs, row), Fraction(0))
@@ -192,7 +192,7 @@ class Oracle:
         return sorted(p for p in parts if not any(s not in p and t in p for s, t in self.weights))
 
     def structure(self) -> None:
-        said, leaders = self.data["structure"], [v for part in self.closed for v in part]
+        said, leaders = self.data["structure"][0], [v for part in self.closed for v in part]
         followers = [v for v in range(self.n) if v not in leaders]
         self.require(self.nodes(said["leaders"]) == leaders, "leaders")
         self.require(self.nodes(said["followers"]) == followers, "followers")
@@ -209,7 +209,7 @@ class Oracle:
 
     def claims(self) -> None:
         pieces = sorted((sorted(p) for p in nx.weakly_connected_components(self.digraph)), key=lambda p: p[0])
-        slides, found = self.data["protocol"]["kind"] == "sliding-mode", []
+        slides, found = self.data["problem"]["gain"]["kind"] == "sliding-mode", []
         for piece in pieces:
             own = [part for part in self.closed if part[0] in piece]
             row = 0 if own == [piece] else 1 if len(own) == 1 else 2
@@ -234,11 +234,11 @@ class Oracle:
             found.append((piece, ("strong", "quasi-strong", "weak")[row], claim))
         said = self.data.get("components")
         if len(found) == 1:
-            self.require(self.data["claim"] == found[0][2] and said is None, "claim")
-            self.require(self.data["structure"]["connectivity"] == found[0][1], "connectivity")
+            self.require(self.data.get("claim") == found[0][2] and said is None, "claim")
+            self.require(self.data["structure"][0]["connectivity"] == found[0][1], "connectivity")
         elif isinstance(said, list):
             told = [(self.nodes(c["nodes"]), c["connectivity"], c["claim"]) for c in said]
-            self.require(self.data["claim"] is None and told == found, "claims of components")
+            self.require("claim" not in self.data and told == found, "claims of components")
 
     # ------------------------------------------------------------------ outcome
 
@@ -253,17 +253,17 @@ class Oracle:
 
     @cached_property
     def start(self) -> Vector | None:
-        said = self.data["initial_state"]
+        said = self.data["problem"].get("initial_state")
         return None if said is None else self.vector(said)
 
     @cached_property
     def sigma0(self) -> Vector:
-        said = self.data["sliding_variable"]
+        said = self.data["problem"].get("sliding_variable")
         return [Fraction(0)] * self.n if said is None else self.vector(said)
 
     def final_state(self) -> None:
-        said, state = self.data["influence"], self.data["final_state"]
-        proved = self.data["rates"]["proved"] is not None or not self.weights
+        said, state = self.data.get("influence"), self.data.get("final_state")
+        proved = "proved" in self.data["rates"] or not self.weights
         self.require((self.data["verdict"] == "certified") == (proved and said is not None), "verdict")
         if said is None:
             return
@@ -276,14 +276,14 @@ class Oracle:
             else:
                 inside = all(self.holds(state[label], x) for label, x in zip(self.labels, end, strict=True))
                 for component in self.data.get("components") or ():
-                    own = isinstance(component, dict) and component["final_state"]
+                    own = isinstance(component, dict) and component.get("final_state")
                     ends = {label: end[self.index[label]] for label in own} if own else {}
                     inside = inside and all(self.holds(own[label], x) for label, x in ends.items())
             self.require(inside, "final state")
             zero = [k for k, p in enumerate(self.closed, 1) if self.camps(p) is not None and end[p[0]] == 0]
-            self.require(said["degenerate"] == zero, "degenerate")
+            self.require(said.get("degenerate") == zero, "degenerate")
         balanced = [p for p in self.closed if self.camps(p) is not None]
-        grouped = said["containment_weights"] is None
+        grouped = "containment_weights" not in said
         groups = [p for p in balanced if len(p) > 1 or not grouped]
         listed = said["components"]
         self.require([self.nodes(c["nodes"]) for c in listed] == groups, "groups")
@@ -331,14 +331,12 @@ class Oracle:
 
     @cached_property
     def forms(self) -> list[tuple[Matrix, Matrix, Matrix, list[int]]]:
-        return [self.form(function) for function in self.data["lyapunov"]["functions"]]
+        return [self.form(function) for function in self.data["decays"]]
 
     def functions(self) -> None:
         away = [[(i == j) - x for j, x in enumerate(row)] for i, row in enumerate(self.Q)]
-        for k, (function, (F, P, _, nodes)) in enumerate(
-            zip(self.data["lyapunov"]["functions"], self.forms, strict=True)
-        ):
-            at, rate = f"lyapunov.functions[{k}]", number(function["rate"])
+        for k, (function, (F, P, _, nodes)) in enumerate(zip(self.data["decays"], self.forms, strict=True)):
+            at, rate = f"decays[{k}]", number(function["rate"])
             self.require(sorted(nodes) == [v for v in range(self.n) if self.L[v][v]] or k == 0, f"{at}: nodes")
             self.require(self.decays(F, self.L, rate), f"{at}: rate")
             high = number(function["overshoot"])
@@ -347,7 +345,7 @@ class Oracle:
             within = [[(high * low * (i == j) - x) for j, x in enumerate(row)] for i, row in enumerate(P)]
             above = [[x - low * (i == j) for j, x in enumerate(row)] for i, row in enumerate(P)]
             self.require(low > 0 and semidefinite(above) and semidefinite(within), f"{at}: prefactor")
-            if function["deviation"] is not None:
+            if "deviation" in function:
                 for d, label in zip(away, self.labels, strict=True):
                     c = number(function["deviation"]["agents"][label])
                     least = [[c * x - a * b for x, b in zip(row, d, strict=True)] for row, a in zip(F, d, strict=True)]
@@ -358,11 +356,11 @@ class Oracle:
 
     def paper(self) -> None:
         """Every positive ``rho`` up to an end makes the matrix of the theorem's row definite."""
-        said = self.data["paper"]
-        if said is None or said["rate"] is None:
+        said = self.data.get("paper")
+        if said is None or "rate" not in said:
             return
-        first = self.data["lyapunov"]["functions"][0]
-        same = all(first[key] == said[key] for key in ("coordinates", "blocks", "rho", "rate", "overshoot"))
+        first = self.data["decays"][0]
+        same = all(first.get(key) == said.get(key) for key in ("coordinates", "blocks", "rho", "rate", "overshoot"))
         self.require(same and number(said["rate"]) > 0, "the paper's certificate")
         steps = {s["of"]: s for s in self.data["proof"] if s["kind"] in ("leader-decrease", "leader-margin")}
         gamma: dict[int, Fraction] = {}
@@ -386,9 +384,9 @@ class Oracle:
                 gamma.update({v: b * (min(weights) if least else w) for v, w in zip(nodes, weights, strict=True)})
         margins = [s for s in self.data["proof"] if s["kind"] == "margin"]
         if margins:
-            m, rho = number(margins[0]["numbers"]["m"]), number(said["rho"] or "1")
+            m, rho = number(margins[0]["numbers"]["m"]), number(said.get("rho", "1"))
             self.require(semidefinite(self.coupled(said, gamma, rho, m)), "margin")
-        for end in (x for x in (said["rho_interval"] or {}).values() if x is not None):
+        for end in said.get("rho_interval", {}).values():
             for share in (Fraction(1), Fraction(1, 1000)):
                 self.require(semidefinite(self.coupled(said, gamma, number(end) * share, Fraction(0))), "rho interval")
 
@@ -419,19 +417,19 @@ class Oracle:
         return min(parts, key=lambda part: float(part.mid())) if parts else None
 
     def rates(self) -> None:
-        said, functions = self.data["rates"], self.data["lyapunov"]["functions"]
+        said, functions = self.data["rates"], self.data["decays"]
         known = [(number(m["rate"]), m["class"]) for m in functions]
         for key, kinds in (("diagonal", ("perron", "lmi")), ("proved", None), ("paper", ("paper",))):
             best = max((r for r, kind in known if r > 0 and (kinds is None or kind in kinds)), default=None)
-            self.require((None if said[key] is None else number(said[key])) == best, f"rates.{key}")
-        if said["upper_bound"] is not None:
+            self.require((number(said[key]) if key in said else None) == best, f"rates.{key}")
+        if "upper_bound" in said:
             self.require(self.slowest is not None and not ball(said["upper_bound"]) < 2 * self.slowest, "rates.limit")
-        if (overshoot := self.data["overshoot"]) is not None:
+        if (overshoot := self.data.get("overshoot")) is not None:
             fits = [
                 m
                 for m in functions
                 if m["rate"]
-                and number(m["rate"]) == number(said["proved"] or "0")
+                and number(m["rate"]) == number(said.get("proved", "0"))
                 and number(m["overshoot"]) <= number(overshoot["value"])
                 and f"||{m['coordinates']}||^2" == overshoot["of"]
             ]
@@ -440,7 +438,7 @@ class Oracle:
     # ------------------------------------------------------------------ sliding variables
 
     def reaching(self) -> None:
-        said, g = self.data["reaching_time"], self.gains
+        said, g = self.data.get("reaching_time"), self.gains
         if said is None:
             self.require("mu1" not in g, "reaching times")
             return
@@ -472,7 +470,7 @@ class Oracle:
 
     @cached_property
     def gains(self) -> dict[str, Fraction]:
-        said = self.data["protocol"]
+        said = self.data["problem"]["gain"]
         return {key: number(x) for key, x in said.items() if key not in ("kind", "disturbance")}
 
     @cached_property
@@ -517,7 +515,7 @@ class Oracle:
     def sampled(self) -> list[tuple[float, float, float, np.ndarray]]:
         """``z``, gain, ``s`` and the inputs of the nominal part, one start a column."""
         T, rho1, k = map(float, self.gain)
-        X, found = self.states(self.data["input"]["initial_set"]), []
+        X, found = self.states(self.data["input"].get("initial_set")), []
         for z in INSTANTS:
             s, gain = rho1 * T * -math.expm1(-z) + k * z, rho1 + k / T * math.exp(z)
             if s > self.latest:
@@ -531,37 +529,37 @@ class Oracle:
             self.require(number(said) >= Fraction(seen) * (1 - Fraction(share)), f"{claim}: {said} below {seen!r}")
 
     def effort(self) -> None:
-        said = self.data["input"]
+        said = self.data.get("input")
         if said is None:
             return
         k, slowest = self.gain[2], self.slowest
         ends = said["threshold"]
         if slowest is not None:
-            low, high = ends["lower"], ends["upper"]
+            low, high = ends.get("lower"), ends.get("upper")
             self.require(low is None or not ball(low) > slowest * ball(k), "threshold: lower")
             self.require(high is None or not ball(high) < slowest * ball(k), "threshold: upper")
-            if said["bounded"] is not None and not (slowest * ball(k)).overlaps(flint.arb(1)):
+            if "bounded" in said and not (slowest * ball(k)).overlaps(flint.arb(1)):
                 self.require(said["bounded"] is bool(slowest * ball(k) > 1), "bounded")
         for known, (_, P, _, nodes) in zip(said["constants"], self.forms, strict=True):
             for v, c in enumerate(self.vector(known) if known is not None else ()):
                 e = [Fraction(int(u == v)) for u in nodes]
                 S = [[c * x - a * b for x, b in zip(row, e, strict=True)] for row, a in zip(P, e, strict=True)]
                 self.require(c >= 0 and semidefinite(S), "a constant")
-        if (own := said["sliding"]) is not None:
+        if (own := said.get("sliding")) is not None:
             g = self.gains
             self.require(own["bounded"] is (g["mu3"] * g["kappa"] >= 1), "sliding: bounded")
             push = g["mu2"] + g["mu3"] * g["kappa"] / g["T_r"]
-            for s, x in zip(self.sigma0, self.vector(own["agents"]) if own["agents"] is not None else [], strict=False):
+            for s, x in zip(self.sigma0, self.vector(own["agents"]) if "agents" in own else [], strict=False):
                 self.require(x >= g["mu1"] + push * abs(s), "sliding: agents")
-        if self.from_known and (said["initial_set"] is not None or self.start is not None) and self.n <= 60:
+        if self.from_known and ("initial_set" in said or self.start is not None) and self.n <= 60:
             self.sizes(said)
         for entry in said["residual"]:
             self.limited(entry, said)
-        if said["disturbed"] is not None:
+        if "disturbed" in said:
             self.disturbed(said["disturbed"])
 
     def sizes(self, said: Json) -> None:
-        if said["peak"] is not None:
+        if "peak" in said:
             agents = said["peak"]["agents"]
             self.require(number(said["peak"]["largest"]) == max(map(number, agents.values())), "the largest peak")
             for z, _, _, u in self.sampled:
@@ -572,13 +570,13 @@ class Oracle:
                 )
         # int ||gain E||^2 dt = int gain ||E||^2 ds, and int ||gain E|| dt = int ||E|| ds: Gauss over pieces of z.
         for key, power in (("energy", 2), ("path_length", 1)):
-            if said[key] is not None:
+            if key in said:
                 seen = self.integrated(power).max()
                 self.bounds(said[key], float(seen), key, 1e-6)
 
     def integrated(self, power: int) -> np.ndarray:
         T, rho1, k = map(float, self.gain)
-        X = self.states(self.data["input"]["initial_set"])
+        X = self.states(self.data["input"].get("initial_set"))
         x, w = np.polynomial.legendre.leggauss(4)
         total = np.zeros(X.shape[1])
         for a, b in pairwise((0.0, 0.1, 0.3, 0.7, 1.5, 3.0, 6.0)):
@@ -594,7 +592,7 @@ class Oracle:
     def limited(self, said: Json, effort: Json) -> None:
         T, rho1, k = map(float, self.gain)
         cap, stop, period = (
-            None if said[x] is None else float(number(said[x])) for x in ("gain_cap", "stop_before", "sample_period")
+            float(number(said[x])) if x in said else None for x in ("gain_cap", "stop_before", "sample_period")
         )
         end = T - (stop or 0)
         top = [] if cap is None else [cap]
@@ -606,14 +604,14 @@ class Oracle:
         turn = min(T - k / (g - rho1), end) if g > rho1 + k / T else 0.0
         clock = (rho1 * turn + k * math.log(T / (T - turn)) if turn > 0 else 0.0) + g * (end - max(turn, 0.0))
         self.require(number(said["clock"]) <= Fraction(clock) * (1 + Fraction(1, 10**9)), "clock")
-        X, L = self.states(effort["initial_set"]), np.array([[float(x) for x in row] for row in self.L])
+        X, L = self.states(effort.get("initial_set")), np.array([[float(x) for x in row] for row in self.L])
         if period is None and clock > self.latest:
             return
         if period is None:
             moved, fading = self.motion(clock), self.decaying(clock)
             final = fading @ X
             self.bounds(said["norm"], float(np.linalg.norm(final, axis=0).max()), "what is left")
-            if said["agents"] is not None:
+            if "agents" in said:
                 away = np.abs(moved @ X - np.array([[float(x) for x in row] for row in self.Q]) @ X).max(axis=1)
                 for label, seen in zip(self.labels, away, strict=True):
                     self.bounds(said["agents"][label], float(seen), "what is left of an agent", 1e-6)
@@ -622,7 +620,7 @@ class Oracle:
                     self.bounds(
                         said["largest"], float(np.abs(u).max() / gain * min(gain, g)), f"largest at z = {z}", 1e-6
                     )
-            if said["noise"] is not None:
+            if "noise" in said:
                 n = float(number(said["noise"]["bound"])) * np.random.default_rng(1).choice([-1.0, 1.0], X.shape)
                 final = fading @ (X + n) - L @ n  # of constant noise n: x + n moves as x does without
                 self.bounds(said["noise"]["norm"], float(np.linalg.norm(final, axis=0).max()), "noise", 1e-6)
@@ -637,7 +635,7 @@ class Oracle:
     def disturbed(self, said: Json) -> None:
         T, _, _ = self.gain
         delta = number(said["delta"])
-        if said["drift"] is not None:
+        if "drift" in said:
             for x, row in zip(self.vector(said["drift"]), self.Q, strict=True):
                 self.require(x >= delta * T * sum(map(abs, row), Fraction(0)), "drift")
         # A constant disturbance d: what it adds to the input is -gain L int exp(-L (s(t) - s(r))) d dr.

@@ -29,12 +29,11 @@ LATEST = 4.0
 
 def false_claims_of_agents(data: Json, files: Mapping[str, bytes] | None = None) -> list[str]:
     """Say what is false in an accepted certificate of agents of order n; an empty list if nothing is."""
-    agents, functions = data["agents"], data["agents"]["functions"]
-    known = data["influence"] is not None
+    functions, known = data["agents"]["functions"], "influence" in data
     judge = AgentOracle(data, files or {})
-    certified = known and (bool(functions) or not data["graph"]["edges"])
+    certified = known and (bool(functions) or not data["problem"]["graph"]["modes"][0]["edges"])
     judge.require((data["verdict"] == "certified") is certified, "verdict")
-    empty = data["initial_state"] is None and data["input"] is None and agents is not None
+    empty = "initial_state" not in data["problem"] and "input" not in data
     judge.require(empty and not any(judge.sigma0), "what is said of agents of order 1")
     judge.judged()
     return [*of_graph_alone(data, files), *judge.false]
@@ -42,9 +41,9 @@ def false_claims_of_agents(data: Json, files: Mapping[str, bytes] | None = None)
 
 def of_graph_alone(data: Json, files: Mapping[str, bytes] | None) -> list[str]:
     """Say what is false of the graph alone; most mutants of agents have the same."""
-    proved = data["rates"]["proved"] is not None or not data["graph"]["edges"]
+    proved = "proved" in data["rates"] or not data["problem"]["graph"]["modes"][0]["edges"]
     of_graph = {key: x for key, x in data.items() if key != "agents"}
-    of_graph["verdict"] = "certified" if data["influence"] is not None and proved else "undecided"
+    of_graph["verdict"] = "certified" if "influence" in data and proved else "undecided"
     of_graph["proof"] = [step for step in data["proof"] if step["of"] != "agents"]
     text = json.dumps({**of_graph, "digest": "", "unverified": {}})
     return false_claims(json.loads(text), files) if files else list(_without_files(text))
@@ -74,7 +73,7 @@ class AgentOracle(Oracle):
         self.order, self.d = self.agents["order"], self.agents["dimension"]
         self.a, self.f, self.K = (list(map(number, self.agents[key])) for key in ("plant", "own", "gains"))
         self.r = number(self.agents["rate"])
-        self.cap = None if self.agents["gain_cap"] is None else number(self.agents["gain_cap"])
+        self.cap = number(self.agents["gain_cap"]) if "gain_cap" in self.agents else None
         lower = [list(map(number, row)) for row in self.agents["lower_triangle"]]
         n = self.order
         self.W = [[lower[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)]
@@ -86,7 +85,7 @@ class AgentOracle(Oracle):
         self.require(self.cap is not None or self.r * k > 2 * (self.order - 1), "derivatives need not agree")
         if self.false:
             return
-        self.used = [(e, self.data["lyapunov"]["functions"][e["function"]]) for e in self.agents["functions"]]
+        self.used = [(e, self.data["decays"][e["function"]]) for e in self.agents["functions"]]
         for claim in (
             self.decrease,
             self.spectrum,
@@ -148,7 +147,7 @@ class AgentOracle(Oracle):
 
     def error_constants(self) -> None:
         for entry, function in self.used:
-            if entry["inputs"] is None:
+            if "inputs" not in entry:
                 continue
             _, P, _, nodes = self.form(function)
             for v, c in enumerate(self.vector(entry["inputs"])):
@@ -200,7 +199,7 @@ class AgentOracle(Oracle):
 
     def ends(self) -> None:
         """Final states: ``h + Q M`` of the initial ones."""
-        said = self.agents["final_state"]
+        said = self.agents.get("final_state")
         if said is None:
             return
         n = self.order
@@ -226,8 +225,8 @@ class AgentOracle(Oracle):
     @cached_property
     def run(self) -> list[Motion]:
         """The closed loop, in the coordinates of the file."""
-        keys = ("order", "dimension", "plant", "own", "gains", "gain_cap", "offsets", "initial_state")
-        told = {key: self.agents[key] for key in keys} | {"protocol": self.data["protocol"], "labels": self.labels}
+        keys = ("order", "dimension", "plant", "own", "gains", "offsets", "initial_state")
+        told = {key: self.agents[key] for key in keys} | {"gain": self.data["problem"]["gain"], "labels": self.labels}
         text = json.dumps(told, sort_keys=True)
         return integrated(self.key, text, tuple(map(float, self.gain)), None if self.cap is None else float(self.cap))
 
@@ -239,7 +238,7 @@ class AgentOracle(Oracle):
 
     def bounds_of_motion(self) -> None:
         """Decrease, deviations, residual and input along a motion."""
-        if self.agents["initial_state"] is None or not self.used:
+        if "initial_state" not in self.agents or not self.used:
             return
         H = np.array([[float(x) for x in self.offsets(label)] for label in self.labels])
         W, r = [float(self.W[i][i]) for i in range(self.order)], float(self.r)
@@ -247,7 +246,7 @@ class AgentOracle(Oracle):
         known = []
         for _, function in self.used:
             Z = np.array([[float(x) for x in row] for row in self.form(function)[0]])
-            deviation = function["deviation"]
+            deviation = function.get("deviation")
             constants = None if deviation is None else [float(number(c)) for c in self.by_label(deviation["agents"])]
             known.append((Z, constants, self.value(Z, self.less(self.run[0].states, H), 1 / self.run[0].gain)))
         for at in self.run:
@@ -276,7 +275,7 @@ class AgentOracle(Oracle):
         return found
 
     def judge_input(self) -> None:
-        said = self.agents["input"]
+        said = self.agents.get("input")
         if said is None:
             return
         self.require(number(said["largest"]) == max(map(number, said["agents"].values())), "the largest input")
@@ -288,7 +287,7 @@ class AgentOracle(Oracle):
                 self.require(float(number(bound)) * (1 + 1e-9) >= seen - 1e-7, f"input at z = {at.z}: {bound} {seen}")
 
     def judge_residual(self, H: np.ndarray, Q: np.ndarray) -> None:
-        said = self.agents["residual"]
+        said = self.agents.get("residual")
         if said is None:
             return
         last = self.run[-1]
@@ -303,7 +302,7 @@ class AgentOracle(Oracle):
 
     def judge_ends(self, last: Motion) -> None:
         """With a capped gain the motion goes on to the deadline: what is claimed there, from the motion itself."""
-        said, left = self.agents["final_state"], self.agents["residual"]["agents"]
+        said, left = self.agents.get("final_state"), self.agents["residual"]["agents"]
         for v, label in enumerate(self.labels if said is not None else ()):
             middles = np.array([[float(self.middle(x)) for x in row] for row in said[label]])
             off = np.linalg.norm(last.states[v] - middles, axis=0)

@@ -37,7 +37,9 @@ class Motion(NamedTuple):
 def false_claims_of_cascade(data: Json, files: Mapping[str, bytes] | None = None) -> list[str]:
     """Say what is false in an accepted certificate of the cascade; an empty list if nothing is."""
     judge = CascadeOracle(data, files or {})
-    proved = data["influence"] is not None and (bool(data["agents"]["functions"]) or not data["graph"]["edges"])
+    proved = "influence" in data and (
+        bool(data["agents"]["functions"]) or not data["problem"]["graph"]["modes"][0]["edges"]
+    )
     judge.require((data["verdict"] == "certified") is proved, "verdict")
     judge.require(not any(judge.sigma0), "sliding variables")
     judge.judged()
@@ -59,7 +61,7 @@ class CascadeOracle(AgentOracle):
         self.require(self.alpha > 0, "alpha is not positive")
         if self.false:
             return
-        self.used = [(e, self.data["lyapunov"]["functions"][e["function"]]) for e in self.agents["functions"]]
+        self.used = [(e, self.data["decays"][e["function"]]) for e in self.agents["functions"]]
         for claim in (
             self.error_constants,
             self.common,
@@ -73,7 +75,7 @@ class CascadeOracle(AgentOracle):
 
     def velocities(self) -> None:
         """Velocities vanish at ``T`` where ``k Re lambda > 1``."""
-        said = self.agents["final_state"]
+        said = self.agents.get("final_state")
         if said is None or not any(len(row) > 1 for rows in said.values() for row in rows):
             return
         values = np.linalg.eigvals(np.array([[float(x) for x in row] for row in self.L]))
@@ -93,11 +95,11 @@ class CascadeOracle(AgentOracle):
 
     def roots(self) -> None:
         """``initial`` and ``drive`` of every function used, in rationals."""
-        begin = self.agents["initial_state"]
+        begin = self.agents.get("initial_state")
         for entry, function in self.used:
             self.require(number(function["rate"]) > 0, "a function that does not decay")
             if begin is None:
-                self.require(entry["initial"] is None and entry["drive"] is None, "roots without states")
+                self.require("initial" not in entry and "drive" not in entry, "roots without states")
                 continue
             Z = self.form(function)[0]
             starts = [[row[axis][0] for axis in range(self.d)] for row in self.shifted]
@@ -112,7 +114,7 @@ class CascadeOracle(AgentOracle):
 
     def along_a_motion(self) -> None:
         """``V`` of positions, and the input, along a motion."""
-        if self.agents["initial_state"] is None:
+        if "initial_state" not in self.agents:
             return
         X = np.array([[[float(x) for x in row] for row in agent] for agent in self.shifted])
         L = np.array([[float(x) for x in row] for row in self.L])
@@ -128,7 +130,7 @@ class CascadeOracle(AgentOracle):
             for z, size in zip(run.z, sizes, strict=True):
                 bound = v * math.exp(-rate / 2 * clock(self.gain, z)) + w * integral(self.gain, self.alpha, rate, z)
                 self.require(size <= bound * (1 + SLACK) + 1e-13 * sizes[0], f"V at z = {z}")
-        said = self.agents["input"]
+        said = self.agents.get("input")
         if said is None:
             return
         self.require(number(said["largest"]) == max(map(number, said["agents"].values())), "the largest input")
@@ -146,7 +148,7 @@ class CascadeOracle(AgentOracle):
         told = self.data.get("instants")
         if told is None:
             return
-        self.require(self.agents["initial_state"] is not None and told, "instants of no motion")
+        self.require("initial_state" in self.agents and told, "instants of no motion")
         if self.false:
             return
         T, rho1, k = self.gain

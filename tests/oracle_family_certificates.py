@@ -44,10 +44,10 @@ class FamilyOracle:
 
     def __init__(self, data: Json, files: Mapping[str, bytes]):
         self.data, self.files, self.false = data, files, list[str]()
-        self.labels: list[str] = data["graph"]["nodes"]
+        self.labels: list[str] = data["problem"]["graph"]["nodes"]
         self.index = {label: v for v, label in enumerate(self.labels)}
         self.n = len(self.labels)
-        self.modes = [(self.edges(mode["edges"]), mode["undirected"]) for mode in data["graph"]["modes"]]
+        self.modes = [(self.edges(mode["edges"]), "undirected" in mode) for mode in data["problem"]["graph"]["modes"]]
         self.draw = random.Random(0)
 
     def require(self, holds: Any, claim: str) -> None:
@@ -144,13 +144,15 @@ class FamilyOracle:
             if tied:
                 both = {(s, t, high > 0): (low, high) for s, t, low, high in edges}
                 self.require(all(both.get((t, s, x)) == ends for (s, t, x), ends in both.items()), "undirected edges")
-        self.require(self.sha256 == self.data["graph"]["sha256"], "the hash")
+        self.require(self.sha256 == self.data["problem"]["graph"]["sha256"], "the hash")
 
     def structures(self) -> None:
-        for (edges, _), said in zip(self.modes, self.data["structure"]["modes"], strict=True):
+        for (edges, _), said in zip(self.modes, self.data["structure"], strict=True):
             weights = [(s, t, str(self.ends((s, t, low, high))[0])) for s, t, low, high in edges]
             rows = [[self.labels[s], self.labels[t], w] for s, t, w in weights if Fraction(w)]
-            one = Oracle({"graph": {"nodes": self.labels, "edges": rows}, "structure": said}, {})
+            one = Oracle(
+                {"problem": {"graph": {"nodes": self.labels, "modes": [{"edges": rows}]}}, "structure": [said]}, {}
+            )
             one.structure()
             pieces, closed = nx.number_weakly_connected_components(one.digraph), one.closed
             row = 0 if len(closed) == 1 and len(closed[0]) == self.n else 1 if len(closed) == 1 else 2
@@ -176,24 +178,23 @@ class FamilyOracle:
         return "interval bipartite consensus" if single else "bipartite containment"
 
     def behaviours(self) -> None:
-        told = [
-            {"theorem": "common kernel", "behaviour": self.behaviour(nodes), "signal": "any"} for nodes in self.pieces
-        ]
+        told = [{"theorem": "common kernel", "behaviour": self.behaviour(nodes)} for nodes in self.pieces]
         if len(told) == 1:
-            self.require(self.data["claim"] == told[0] and "components" not in self.data, "claim")
+            self.require(self.data.get("claim") == told[0] and "components" not in self.data, "claim")
         else:
             names = [[self.labels[v] for v in nodes] for nodes in self.pieces]
             found = [{"nodes": x, "claim": claim} for x, claim in zip(names, told, strict=True)]
-            self.require(self.data["claim"] is None and self.data["components"] == found, "claims of components")
+            self.require("claim" not in self.data and self.data["components"] == found, "claims of components")
         self.require(self.data["verdict"] == "certified", "verdict")
-        empty = ("paper", "rates", "overshoot", "influence")
-        self.require(all(self.data[key] is None for key in empty), "parts that families do not have")
+        empty = {"paper", "rates", "overshoot", "influence"}
+        self.require(not empty & set(self.data), "parts that families do not have")
+        self.require(self.data["problem"]["signal"] == "any", "signal")
 
     # ------------------------------------------------------------------ Lyapunov functions
 
     def functions(self) -> None:
         steps = {x["of"]: x for x in self.data["proof"] if x["kind"] == "family-rate"}
-        for number_of, said in enumerate(self.data["lyapunov"]["functions"]):
+        for number_of, said in enumerate(self.data["decays"]):
             if said["class"] == "rows":
                 self.rows(said)
                 continue
@@ -213,10 +214,7 @@ class FamilyOracle:
             to_zero = self.lift(basis, nodes, free, pivots)
             constants = [number(x) for x in said["inputs"].values()]
             self.require(list(said["inputs"]) == [self.labels[v] for v in nodes], "inputs by agent")
-            rates = [
-                number(steps[f"lyapunov.functions[{number_of}].modes[{k}]"]["numbers"]["b"])
-                for k in range(len(self.modes))
-            ]
+            rates = [number(steps[f"decays[{number_of}].modes[{k}]"]["numbers"]["b"]) for k in range(len(self.modes))]
             self.require(min(rates) == number(said["rate"]), "the least rate")
             G = inverse(P)
             for some, rate in zip(self.members, rates, strict=True):
@@ -291,7 +289,7 @@ class FamilyOracle:
                 self.require(semidefinite(S), "a rate of squares")
 
     def balanced_first(self, nodes: list[int]) -> list[list[int]]:
-        said = self.data["structure"]["modes"][0]["closed_components"]
+        said = self.data["structure"][0]["closed_components"]
         groups = [[self.index[label] for label in c["nodes"]] for c in said if c["balanced"]]
         return [group for group in groups if group[0] in nodes]
 
@@ -323,20 +321,20 @@ class FamilyOracle:
 
     @cached_property
     def gains(self) -> dict[str, Fraction]:
-        said = self.data["protocol"]
+        said = self.data["problem"]["gain"]
         return {key: number(x) for key, x in said.items() if key not in ("kind", "disturbance")}
 
     @cached_property
     def sigma0(self) -> Vector:
-        said = self.data["sliding_variable"]
+        said = self.data["problem"].get("sliding_variable")
         return [Fraction(0)] * self.n if said is None else [number(said[label]) for label in self.labels]
 
     reach, integral = Oracle.reach, staticmethod(Oracle.integral)
 
     def sliding(self) -> None:
         """Reaching times, and the sliding part of the input: no graph enters, so that it is as for one graph."""
-        g, said = self.gains, self.data["sliding_variable"]
-        slides = self.data["protocol"]["kind"] == "sliding-mode"
+        g, said = self.gains, self.data["problem"].get("sliding_variable")
+        slides = self.data["problem"]["gain"]["kind"] == "sliding-mode"
         self.require(slides == ("mu1" in g) == (said is not None), "a sliding variable")
         self.require(min(x for key, x in g.items() if key != "delta") > 0, "a parameter")
         Oracle.reaching(self)  # type: ignore[arg-type]
@@ -347,16 +345,16 @@ class FamilyOracle:
         self.require(0 <= g["delta"] < g["mu1"] and said is not None and list(said) == self.labels, "mu1 and delta")
         self.require(own["bounded"] is (g["mu3"] * g["kappa"] >= 1), "sliding: bounded")
         push = g["mu2"] + g["mu3"] * g["kappa"] / g["T_r"]
-        if own["agents"] is not None:
+        if "agents" in own:
             self.require(own["bounded"] or not any(self.sigma0), "sliding: not bounded")
             for s, x in zip(self.sigma0, map(number, own["agents"].values()), strict=True):
                 self.require(x >= g["mu1"] + push * abs(s), "sliding: agents")
 
     def drives(self) -> None:
         """How sliding variables drive a function: ``C L sigma`` of members, and corners of what is stated."""
-        told = self.data["lyapunov"].get("drives")
+        told = self.data.get("drives")
         self.require((told is not None) == any(self.sigma0), "drives")
-        for said, text in zip(self.data["lyapunov"]["functions"], told or [], strict=False):
+        for said, text in zip(self.data["decays"], told or [], strict=False):
             nodes = self.pieces[said["component"]]
             basis, c = self.common_kernel(nodes), number(text)
             if basis is None:
@@ -396,7 +394,7 @@ class FamilyOracle:
 
     @cached_property
     def start(self) -> Vector | None:
-        said = self.data["initial_state"]
+        said = self.data["problem"].get("initial_state")
         return None if said is None else [number(said[label]) for label in self.labels]
 
     @cached_property
@@ -408,7 +406,7 @@ class FamilyOracle:
         return self.common_kernel(nodes) is None
 
     def finals(self) -> None:
-        said = self.data["final_state"]
+        said = self.data.get("final_state")
         self.require((said is None) == (self.start is None), "final states without a state, or the other way round")
         if said is None or self.start is None:
             return
@@ -475,11 +473,11 @@ class FamilyOracle:
     def inputs(self) -> None:
         said, g = self.data["input"], self.gains
         T, rho1, pole = self.gain
-        if said["bounded"] is None:
-            self.require(said["peaks"] is None, "peaks of an input that is not bounded")
+        if "bounded" not in said:
+            self.require("peaks" not in said, "peaks of an input that is not bounded")
             return
         unknown = self.start is None or ("mu1" in g and g["mu3"] * g["kappa"] < 1 and any(self.sigma0))
-        self.require(said["bounded"] is True and (said["peaks"] is None) == unknown, "bounded")
+        self.require(said["bounded"] is True and ("peaks" not in said) == unknown, "bounded")
         for nodes in self.pieces:
             self.require(not self.depends(nodes), "an input that depends on the signal is bounded")
             for some in self.members:
@@ -487,7 +485,7 @@ class FamilyOracle:
                     values = np.linalg.eigvals(np.array(self.part(L, nodes), dtype=float))
                     least = min((z.real for z in values if abs(z) > 1e-6 * max(abs(values))), default=np.inf)
                     self.require(least * float(pole) >= 1 - 1e-6, "an eigenvalue that makes the input unbounded")
-        if said["peaks"] is None or self.start is None:
+        if "peaks" not in said or self.start is None:
             return
         self.require(list(said["peaks"]) == self.labels, "peaks by agent")
         bounds = [number(x) for x in said["peaks"].values()]
@@ -590,12 +588,12 @@ class FamilyOracle:
                 self.require(False, "a rate without a common kernel")
                 continue
             rate, ratio, signals = number(said["rate"]), number(said["ratio"]), said["signals"]
-            self.require((said["bounded"] is True) == (rate * self.gain[2] >= 2), "a bounded input")
-            self.require(said["bounded"] in (True, None), "bounded")
+            self.require(said.get("bounded", False) == (rate * self.gain[2] >= 2), "a bounded input")
+            self.require(said.get("bounded", True) is True, "bounded")
             dwell = None if signals == "constant" else number(signals["dwell"])
             self.require(dwell is None or (dwell > 0 and signals["clock"] in ("t", "s")), "a dwell time")
-            if said["forms"] is None:
-                own = [number(V["rate"]) for V in self.data["lyapunov"]["functions"] if self.same_part(V, said)]
+            if "forms" not in said:
+                own = [number(V["rate"]) for V in self.data["decays"] if self.same_part(V, said)]
                 self.require(ratio == 1 and rate <= max(own), "a rate of restricted signals by functions")
                 continue
             forms = [self.symmetric(lower) for lower in said["forms"]]
@@ -685,7 +683,7 @@ class FamilyOracle:
 
     def ends_of(self, nodes: list[int], said: Json, runs: Any) -> Iterator[float]:
         """How far agents end outside of what is said, under signals that are played."""
-        ends = said["final_state"]
+        ends = said.get("final_state")
         self.require((ends is None) == (self.start is None), "final states of restricted signals")
         if ends is None:
             return
@@ -748,7 +746,7 @@ class FamilyOracle:
         if len(pivots) != len(basis):
             return
         told = None if rate <= 0 else "bipartite consensus" if basis else "stability"
-        self.require(said["behaviour"] == told, "a behaviour by shares")
+        self.require(said.get("behaviour") == told, "a behaviour by shares")
         self.require(len(P) == len(free) and self.definite(P), "P is not definite")
         to_zero = self.lift(basis, nodes, free, pivots)
         for some, b in zip(self.members, rates, strict=True):
@@ -762,7 +760,7 @@ class FamilyOracle:
 
     def ends_by_shares(self, nodes: list[int], said: Json, every: list[Matrix], basis: Matrix) -> None:
         """Where agents end by shares: the value of what all members keep, in rationals, and modes played in turn."""
-        known = self.start is not None and said["behaviour"] is not None and not any(self.sigma0)
+        known = self.start is not None and "behaviour" in said and not any(self.sigma0)
         self.require(known and list(said["final_state"]) == [self.labels[v] for v in nodes], "ends by shares")
         if not known or self.start is None:
             return

@@ -119,7 +119,7 @@ class LateOracle(Oracle):
     @cached_property
     def target(self) -> list[Fraction] | None:
         """``Q X(0)``; None without a state."""
-        if self.data["final_state"] is None:
+        if "final_state" not in self.data:
             return None
         return [sum((q * x for q, x in zip(row, self.start or [], strict=True)), Fraction(0)) for row in self.Q]
 
@@ -162,11 +162,11 @@ class LateOracle(Oracle):
     @cached_property
     def pairs(self) -> list[tuple[int, int]]:
         """Edges in the order of the file."""
-        return [(s, t) for s, t, _ in self.edges(self.data["graph"]["edges"])]
+        return [(s, t) for s, t, _ in self.edges(self.data["problem"]["graph"]["modes"][0]["edges"])]
 
     @cached_property
     def delay(self) -> Fraction:
-        oldest, packets = max(self.latencies.values()), self.said["packets"]
+        oldest, packets = max(self.latencies.values()), self.said.get("packets")
         return oldest + ((number(packets["losses"]) + 1) * number(packets["period"]) if packets else 0)
 
     @cached_property
@@ -182,13 +182,13 @@ class LateOracle(Oracle):
     @cached_property
     def fled(self) -> tuple[Fraction, Fraction] | None:
         """How fast leaders move, and what disturbs followers; None if they rest."""
-        said = self.said["leaders"]
+        said = self.said.get("leaders")
         return None if said is None else (number(said["speed"]), number(said["disturbance"]))
 
     @cached_property
     def sign(self) -> Fraction | None:
         """What followers add times ``sign(e_k)``; None without that."""
-        said = (self.said["leaders"] or {}).get("sign_gain")
+        said = self.said.get("leaders", {}).get("sign_gain")
         return None if said is None else number(said)
 
     @property
@@ -208,10 +208,10 @@ class LateOracle(Oracle):
 
     @cached_property
     def cap(self) -> Fraction | None:
-        return None if self.said["gain_cap"] is None else number(self.said["gain_cap"])
+        return number(self.said["gain_cap"]) if "gain_cap" in self.said else None
 
     def messages(self) -> None:
-        packets = self.said["packets"]
+        packets = self.said.get("packets")
         if packets is not None:
             losses = number(packets["losses"])
             self.require(number(packets["period"]) > 0 and losses >= 0 and losses.denominator == 1, "packets")
@@ -222,32 +222,32 @@ class LateOracle(Oracle):
         self.require(not late or self.cap is not None, "a late own state without a cap")
         self.require(not any(self.sigma0), "sliding variables that move")
         for key in ("rows", "steps", "missed", "staged"):
-            self.require(not self.said[key] or (self.single and not late and self.follow), key)
+            self.require(not self.said.get(key) or (self.single and not late and self.follow), key)
         if self.fled is not None:
             self.require(min(self.fled) >= 0 and "mu1" not in self.gains, "leaders: what they need")
             self.require(self.sign is None or self.sign >= sum(self.fled), "sign_gain")
-            self.require(self.sign is None or not (late or self.said["steps"]), "a sign term: what it needs")
+            self.require(self.sign is None or not (late or "steps" in self.said), "a sign term: what it needs")
             self.require(
-                not any(self.said[key] for key in ("missed", "staged", "settling", "form", "lmi")), "leaders move"
+                not any(key in self.said for key in ("missed", "staged", "settling", "form", "lmi")), "leaders move"
             )
         self.above_rows()
         if self.fled is not None:
             self.kept_after()
-        if self.said["residual"] is not None:
+        if "residual" in self.said:
             self.above_residual()
-        if self.said["missed"] is not None:
+        if "missed" in self.said:
             self.away_at_the_deadline()
-        if self.said["staged"] is not None:
+        if "staged" in self.said:
             self.deadlines()
-        if self.said["settling"] is not None:
+        if "settling" in self.said:
             self.behind_settling_leaders()
-        if self.said["form"] is not None:
+        if "form" in self.said:
             self.small_delays()
-        if self.said["lmi"] is not None:
+        if "lmi" in self.said:
             self.delay_lmi()
         if self.tracks and not self.false:
             self.tracked()
-        elif self.said["input"] is not None:
+        elif "input" in self.said:
             self.slopes()
 
     def slopes(self) -> None:
@@ -324,7 +324,7 @@ class LateOracle(Oracle):
             q, b = (number(step["numbers"][key]) for key in ("q", "b"))
             u = self.by_follower(step["witness"]["u"])
             initial, left, floor = (number(entry[key]) for key in ("initial", "left", "floor"))
-            cap = None if entry["cap"] is None else number(entry["cap"])
+            cap = number(entry["cap"]) if "cap" in entry else None
             self.require(min(u.values()) > 0 and b > 0 and q >= 1, f"{at}: signs")
             for v, x in u.items():
                 heard = sum((w * u[s] for s, w in self.among[v]), Fraction(0))
@@ -343,7 +343,7 @@ class LateOracle(Oracle):
                 self.require(not ball(b * (cap or 0) * self.delay) > ball(q).log(), f"{at}: b cap delay")
             limit = min((x for x in (cap, self.cap) if x is not None), default=None)
             if limit is None:
-                self.require(left == 0 and entry["clock"] is None, f"{at}: left")
+                self.require(left == 0 and "clock" not in entry, f"{at}: left")
             else:
                 clock = number(entry["clock"])
                 self.require(clock >= 0 and not ball(clock) > self.clock(limit), f"{at}: clock")
@@ -500,7 +500,7 @@ class LateOracle(Oracle):
         step = self.witness("messages.form")
         q, b, kap = (number(step["numbers"][key]) for key in ("q", "b", "kap"))
         k, phi = step["witness"]["function"], self.vector(step["witness"]["phi"])
-        function, (F, P, _, nodes) = self.data["lyapunov"]["functions"][k], self.forms[k]
+        function, (F, P, _, nodes) = self.data["decays"][k], self.forms[k]
         r, h = number(function["rate"]), self.cap * self.delay
         self.require(function["coordinates"] == "E" and b > 0 and not ball(q) < ball(b * h).exp(), "form: q")
         inverse = np.array([[float(x) for x in row] for row in P])
@@ -617,7 +617,7 @@ class LateOracle(Oracle):
         self.require(self.single and self.follow, "leaders: groups")
         if self.false:
             return
-        inputs = None if self.said["input"] is None else self.vector(self.said["input"])
+        inputs = None if "input" not in self.said else self.vector(self.said["input"])
         least = [Fraction(0)] * self.n if inputs is None else None
         for i, entry in enumerate(self.said["rows"]):
             step = self.witness(f"messages.rows[{i}]")

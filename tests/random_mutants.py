@@ -12,7 +12,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from mutations import Json, at, changed, containers, leaves, of_container, of_leaf, resealed
+from mutations import EDGES, GRAPH, Json, at, changed, containers, leaves, of_container, of_keys, of_leaf, resealed
 from oracle import number
 
 Rng = np.random.Generator
@@ -62,24 +62,24 @@ def a_leaf(rng: Rng, data: Json, files: dict[str, bytes]) -> Json:
     path, value = pick(rng, list(leaves(data)))
     if isinstance(value, str) and fraction(value) is not None and rng.random() < 0.7:
         return changed(data, path, nudged(rng, value))
-    new = of_leaf(value, data["graph"]["nodes"], False)
+    new = of_leaf(value, data["problem"]["graph"]["nodes"], False)
     return changed(data, path, pick(rng, new)) if new else data
 
 
 def everywhere(rng: Rng, data: Json, files: dict[str, bytes]) -> Json:
     """A number in all places where it stands alike: what is claimed, and the proof of it."""
-    texts = [v for path, v in leaves(data) if fraction(v) is not None and path[0] != "graph"]
+    texts = [v for path, v in leaves(data) if fraction(v) is not None and path[:2] != GRAPH]
     old = pick(rng, texts)
     new = nudged(rng, old)
     for path, value in list(leaves(data)):
-        if value == old and path[0] != "graph":
+        if value == old and path[:2] != GRAPH:
             data = changed(data, path, new)
     return data
 
 
 def a_container(rng: Rng, data: Json, files: dict[str, bytes]) -> Json:
-    path = pick(rng, [p for p in containers(data) if p])
-    new = of_container(at(data, path))
+    path = pick(rng, list(containers(data)))
+    new = [*(of_container(at(data, path)) if path else ()), *(section for _, section in of_keys(at(data, path)))]
     return changed(data, path, pick(rng, new)) if new else data
 
 
@@ -97,19 +97,20 @@ def a_swap(rng: Rng, data: Json, files: dict[str, bytes]) -> Json:
 
 def with_hash(data: Json) -> Json:
     """The same with its edges in order and their SHA-256, by section 5 of the format."""
-    nodes, edges = data["graph"]["nodes"], data["graph"]["edges"]
+    nodes, edges = data["problem"]["graph"]["nodes"], data["problem"]["graph"]["modes"][0]["edges"]
     index = {label: v for v, label in enumerate(nodes)}
     edges = sorted(edges, key=lambda edge: (index[edge[1]], index[edge[0]]))
     plain = {"ensure_ascii": False, "separators": (", ", ": ")}
     lines = [json.dumps([label], **plain) for label in sorted(nodes)]
     lines += [json.dumps([s, t, str(number(w))], **plain) for s, t, w in sorted(edges)]
     sha256 = hashlib.sha256("".join(f"{line}\n" for line in lines).encode("utf-8", "surrogatepass")).hexdigest()
-    return {**data, "graph": {**data["graph"], "edges": edges, "sha256": sha256}}
+    data = changed(data, EDGES, edges)
+    return changed(data, (*GRAPH, "sha256"), sha256)
 
 
 def an_edge(rng: Rng, data: Json, files: dict[str, bytes]) -> Json:
     """Another graph with the same claims: an edge less, more, turned, of another sign or weight."""
-    edges = data["graph"]["edges"]
+    edges = data["problem"]["graph"]["modes"][0]["edges"]
     if not isinstance(edges, list) or not edges:
         return data
     edges, k = copy.deepcopy(edges), int(rng.integers(len(edges)))
@@ -123,18 +124,21 @@ def an_edge(rng: Rng, data: Json, files: dict[str, bytes]) -> Json:
     elif way == 3:
         edges[k][2] = nudged(rng, edges[k][2])
     else:
-        edges.append([*rng.choice(data["graph"]["nodes"], 2).tolist(), "1"])
+        edges.append([*rng.choice(data["problem"]["graph"]["nodes"], 2).tolist(), "1"])
     ends = [(s, t) for s, t, _ in edges]
     if len(set(ends)) < len(ends) or any(s == t for s, t in ends) or not all(Fraction(w) for _, _, w in edges):
         return data
-    return with_hash({**data, "graph": {**data["graph"], "edges": edges}})
+    return with_hash(changed(data, EDGES, edges))
 
 
 def a_label(rng: Rng, data: Json, files: dict[str, bytes]) -> Json:
     """A node of another name, wherever it is named."""
-    edges = data["graph"]["edges"]
-    old, new = pick(rng, data["graph"]["nodes"]), pick(rng, ["another", "", "0x1p3", '"\\', "é\U0001f600", "count"])
-    if new in data["graph"]["nodes"] or not isinstance(edges, list):
+    edges = data["problem"]["graph"]["modes"][0]["edges"]
+    old, new = (
+        pick(rng, data["problem"]["graph"]["nodes"]),
+        pick(rng, ["another", "", "0x1p3", '"\\', "é\U0001f600", "count"]),
+    )
+    if new in data["problem"]["graph"]["nodes"] or not isinstance(edges, list):
         return data
 
     def renamed(value: Any) -> Any:
@@ -142,7 +146,8 @@ def a_label(rng: Rng, data: Json, files: dict[str, bytes]) -> Json:
             return {new if key == old and key not in ("u",) else key: renamed(x) for key, x in value.items()}
         return [renamed(x) for x in value] if isinstance(value, list) else new if value == old else value
 
-    return with_hash({**data, **{key: renamed(data[key]) for key in data if key not in ("protocol", "rates")}})
+    renewed = {**data, **{key: renamed(data[key]) for key in data if key != "rates"}}
+    return with_hash(changed(renewed, ("problem", "gain"), data["problem"]["gain"]))
 
 
 def a_side_file(rng: Rng, data: Json, files: dict[str, bytes]) -> Json:

@@ -38,20 +38,26 @@ HOSTILE = [
 
 
 def forged(folder: Path, **changes: Any) -> Path:
-    """Change a saved certificate; its digest is made anew."""
+    """Change a saved certificate, without the parts that are None; its digest is made anew."""
     data = json.loads((folder / "c.json").read_text(encoding="utf-8"))
     for key, value in changes.items():
-        data[key] = {**data[key], **value} if isinstance(value, dict) else value
+        part = data["problem"] if key in data["problem"] else data
+        part[key] = _present({**part[key], **value}) if isinstance(value, dict) else value
+    data = _present(data)
     data["digest"] = digest(data)
     (folder / "c.json").write_text(json.dumps(data), encoding="utf-8")
     return folder / "c.json"
+
+
+def _present(part: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in part.items() if value is not None}
 
 
 def undecided(folder: Path) -> Path:
     """Take the final state out of a certificate: the decay is proved, where it ends is not stated."""
     certify(load_graph("fig3a"), NOMINAL, [-4, 3, -1, 2, -2, 5], asks=Asks(simulation=False)).save(folder / "c.json")
     data = json.loads((folder / "c.json").read_text())
-    functions = [{**m, "deviation": None} for m in data["lyapunov"]["functions"]]
+    functions = [_present({**m, "deviation": None}) for m in data["decays"]]
     proof = [s for s in data["proof"] if s["kind"] not in ("final-state", "deviation")]
     unverified = {"notes": ["<i>no final state</i>", 7]}
     return forged(
@@ -60,7 +66,7 @@ def undecided(folder: Path) -> Path:
         final_state=None,
         verdict="undecided",
         proof=proof,
-        lyapunov={"functions": functions},
+        decays=functions,
         unverified=unverified,
     )
 

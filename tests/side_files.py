@@ -56,7 +56,7 @@ class Side:
 def with_side_files(data: Json) -> tuple[Json, dict[str, bytes]]:
     """The same certificate with every vector in a side file that may stand in one, and the files by name."""
     data, side = copy.deepcopy(data), Side()
-    index = {label: v for v, label in enumerate(data["graph"]["nodes"])}
+    index = {label: v for v, label in enumerate(data["problem"]["graph"]["nodes"])}
 
     def move(where: Any, key: str) -> None:
         said = where[key]
@@ -67,7 +67,7 @@ def with_side_files(data: Json) -> tuple[Json, dict[str, bytes]]:
     def label(where: Any, key: str) -> None:
         where[key] = side.integers([index[x] for x in where[key]])
 
-    edges = data["graph"]["edges"]
+    edges = data["problem"]["graph"]["modes"][0]["edges"]
     if isinstance(edges, list) and edges:
         columns = zip(*((index[s], index[t], exact(w)) for s, t, w in edges), strict=True)
         source, target, weight = columns
@@ -75,30 +75,30 @@ def with_side_files(data: Json) -> tuple[Json, dict[str, bytes]]:
         if max(abs(w * scale) for w in weight) < 2**63:
             named = {"source": source, "target": target, "weight": [int(w * scale) for w in weight]}
             columns_of = {key: side.column(list(values)) for key, values in named.items()}
-            data["graph"]["edges"] = {"count": len(edges), "scale": str(scale), **columns_of}
-    label(data["structure"], "leaders")
-    label(data["structure"], "followers")
+            data["problem"]["graph"]["modes"][0]["edges"] = {"count": len(edges), "scale": str(scale), **columns_of}
+    label(data["structure"][0], "leaders")
+    label(data["structure"][0], "followers")
     for key in ("initial_state", "sliding_variable"):
-        if data[key] is not None:
-            move(data, key)
+        if key in data["problem"]:
+            move(data["problem"], key)
     if isinstance(data.get("components"), dict):
         number = {index[x]: k for k, nodes in enumerate(data["components"]["nodes"]) for x in nodes}
         data["components"]["nodes"] = side.integers([number[v] for v in range(len(index))])
-    if data["final_state"] is not None:
+    if "final_state" in data:
         data["final_state"] = side.balls(list(data["final_state"].values()))
         for component in data.get("components", []):
             if isinstance(component, dict):
-                component["final_state"] = None
+                del component["final_state"]
     for step in data["proof"]:
         if step["kind"] == "dominance":
             move(step["witness"], "vector")
-        if step["kind"] == "final-state" and step["witness"] is not None:
+        if step["kind"] == "final-state" and "witness" in step:
             move(step["witness"], "u")
     dominated = {step["of"] for step in data["proof"] if step["kind"] == "dominance"}
-    for k, function in enumerate(data["lyapunov"]["functions"]):
+    for k, function in enumerate(data["decays"]):
         if function["class"] != "paper":
             label(function["blocks"][0], "nodes")
-        if f"lyapunov.functions[{k}]" in dominated:
+        if f"decays[{k}]" in dominated:
             move(function["blocks"][0], "diagonal")
     return resealed(data), side.files
 
@@ -108,21 +108,21 @@ def with_factors(data: Json) -> Json:
     data = copy.deepcopy(data)
     slower, room = Fraction(9, 10), Fraction(99, 100)
     told: set[tuple[int, Fraction]] = set()
-    labels = data["graph"]["nodes"]
+    labels = data["problem"]["graph"]["nodes"]
     heard: dict[str, dict[str, Fraction]] = {label: {} for label in labels}
-    for s, t, w in data["graph"]["edges"]:
+    for s, t, w in data["problem"]["graph"]["modes"][0]["edges"]:
         heard[t][s] = exact(w)
-    groups = [c for c in data["structure"]["closed_components"] if len(c["nodes"]) > 1]
+    groups = [c for c in data["structure"][0]["closed_components"] if len(c["nodes"]) > 1]
     for key in ("diagonal", "proved"):
         data["rates"][key] = str(exact(data["rates"][key]) * slower)
     lower = exact(data["input"]["threshold"]["lower"]) * slower
     data["input"]["threshold"]["lower"] = str(lower)
-    if data["input"]["bounded"] and lower < 1:
-        data["input"]["bounded"] = None
+    if data["input"].get("bounded") and lower < 1:
+        del data["input"]["bounded"]
         data["proof"] = [step for step in data["proof"] if step["kind"] != "input-threshold"]
     for step in data["proof"]:
         if step["kind"] == "dominance":
-            function = data["lyapunov"]["functions"][int(step["of"][len("lyapunov.functions[") : -1])]
+            function = data["decays"][int(step["of"][len("decays[") : -1])]
             function["rate"] = step["numbers"]["b"] = str(exact(function["rate"]) * slower)
             block = function["blocks"][0]
             weight = dict(zip(block["nodes"], map(exact, block["diagonal"]), strict=True))
@@ -151,7 +151,6 @@ def factor(S: np.ndarray, bits: int = 40) -> Json:
     R = np.rint(np.ldexp(np.linalg.cholesky(np.array(unit) - 1e-9 * np.eye(n)), bits)).astype(np.int64)
     columns = [np.flatnonzero(R[:, k]) for k in range(n)]
     return {
-        "parents": None,
         "order": list(range(n))[::-1],
         "indptr": [0, *np.cumsum([len(column) for column in columns]).tolist()],
         "indices": [int(i) for column in columns for i in column],
@@ -159,5 +158,4 @@ def factor(S: np.ndarray, bits: int = 40) -> Json:
         "exponents": exponents[::-1],
         "bits": bits,
         "power": power,
-        "weights": None,
     }

@@ -6,10 +6,10 @@ module Z = Number.Z
 
 type t = { base : Reader.t; record : Checker.agents; points : q list }
 
-let keys = [ "order"; "dimension"; "plant"; "own"; "gains"; "coupling"; "lower_triangle"; "rate"; "gain_cap"; "points";
-  "functions"; "offsets"; "initial_state"; "motion"; "final_state"; "residual"; "input" ]
-let section = function Obj l -> List.assoc_opt "agents" l | _ -> None
-let null_in json key = match json with Obj l -> List.assoc_opt key l = Some Null | _ -> false
+let keys = [ "order"; "dimension"; "plant"; "own"; "gains"; "coupling"; "lower_triangle"; "rate"; "points"; "functions";
+  "offsets"; "motion" ]
+let some = [ "gain_cap"; "initial_state"; "final_state"; "residual"; "input" ]
+let section = part "agents"
 let many_points = 257 and longest = 2000
 
 (* a matrix of few rows as a sum of squares, where it is one: coefficients and rows, by elimination; none is believed *)
@@ -56,9 +56,9 @@ let symmetric n v =
   List.init n (fun i -> List.init n (fun j -> rows.(max i j).(min i j)))
 
 (* the functions that are used, with constants of their input, which the certificate of the graph bears in its record *)
-let functions (r : Reader.t) proof is_full v =
+let functions (r : Reader.t) proof v =
   let one (before, funcs) v =
-    let get = fields "a function that is used" [ "function"; "inputs" ] v in
+    let get = fields "a function that is used" ~may:[ "inputs" ] [ "function" ] v in
     let z = integer "function" (get "function") in
     need (Z.gt z (Z.of_int before) && Z.lt z (Z.of_int (List.length funcs))) "functions that are used: none such, or in another order";
     let k = Z.to_int z in
@@ -66,8 +66,8 @@ let functions (r : Reader.t) proof is_full v =
     k, match get "inputs" with
     | Null -> funcs
     | v ->
-        need (is_full k) "constants of the input of a Lyapunov function that is not full";
-        bare_of proof "input-constants" (Printf.sprintf "lyapunov.functions[%d]" k);
+        need (r.full k) "constants of the input of a Lyapunov function that is not full";
+        bare_of proof "input-constants" (Printf.sprintf "decays[%d]" k);
         let constants = by_agent r.nodes number "inputs" v in
         List.mapi (fun i f -> if i = k then { f with constants = Some constants } else f) funcs in
   let used, _, funcs = List.fold_left (fun (used, before, funcs) v -> let k, funcs = one (before, funcs) v in k :: used, k, funcs)
@@ -96,17 +96,15 @@ let axes ?told (r : Reader.t) n dimension get ends_known =
 
 (* the certificate of the graph of agents of order n *)
 let graph_of json : Reader.t =
-  (match json with
-   | Obj l -> List.iter (fun (key, _) -> need (not (List.mem_assoc key l)) (key ^ " beside agents of order n")) Reader.besides
-   | _ -> ());
   let r = Reader.certificate json in
-  List.iter (fun key -> need (null_in json key) (key ^ " beside that of the agents")) [ "initial_state"; "final_state"; "input" ];
+  need (part "messages" json = None) "messages beside agents of order n";
+  need (r.cert.start = [] && part "input" json = None) "initial_state or input beside that of the agents";
   List.iter (fun x -> need (Number.equal x Number.zero) "agents of order n begin with sliding variables that are 0") r.cert.sliding;
   if r.cert.enclosed then unsupported "agents of order n on a large form";
   r
 
 let certificate json : t =
-  let get = match section json with Some v -> fields "agents" keys v | None -> bad "no agents of order n" in
+  let get = match section json with Some v -> fields "agents" ~may:some keys v | None -> bad "no agents of order n" in
   let r = graph_of json in
   let n = count "order" (get "order") in
   let dimension = count "dimension" (get "dimension") in
@@ -119,10 +117,7 @@ let certificate json : t =
   let rec ascending = function a :: (b :: _ as l) -> Number.compare a b < 0 && ascending l | _ -> true in
   need (ascending points) "points do not ascend";
   let proof = { rest = r.rest; checked = []; unchecked = [] } in
-  let listed = match json with
-    | Obj l -> (match List.assoc_opt "lyapunov" l with Some (Obj l) -> entries "functions" (List.assoc "functions" l) | _ -> []) | _ -> [] in
-  let is_full k = match List.nth listed k with Obj l -> List.assoc_opt "class" l = Some (Str "full") | _ -> false in
-  let used, funcs = functions r proof is_full (get "functions") in
+  let used, funcs = functions r proof (get "functions") in
   need (used <> [] || r.cert.edges = []) "what was proved makes another verdict";
   let coupling, rate = single "coupling", single "rate" in
   bare_of proof "agent-positive" "agents";
@@ -189,8 +184,8 @@ let certificate json : t =
         let tops = by_agent r.nodes number "input" (get "agents") in
         need (Number.equal (number "largest" (get "largest")) (largest tops)) "the largest input is another"; tops in
   List.iteri (fun i _ -> skipped proof "agent-phase" (Printf.sprintf "phases[%d]" i))
-    (match json with Obj l -> (match List.assoc_opt "phases" l with Some v -> entries "phases" v | None -> []) | _ -> []);
-  (match json with Obj l when List.mem_assoc "instants" l -> skipped proof "agent-instants" "instants" | _ -> ());
+    (Option.fold ~none:[] ~some:(entries "phases") (part "phases" json));
+  if part "instants" json <> None then skipped proof "agent-instants" "instants";
   need (proof.rest = []) "an obligation that nothing asks for";
   let slope = r.cert.rho1 in
   let cert = { r.cert with funcs; rho1 = if Z.sign slope.qnum = 0 then Number.one else slope } in

@@ -6,17 +6,17 @@ module Z = Number.Z
 
 type t = { base : Reader.t; record : Checker.cascade; hint : Checker.thrusts }
 
-let keys = [ "cascade"; "dimension"; "functions"; "offsets"; "initial_state"; "motion"; "final_state"; "input" ]
-let is_cascade = function Obj l -> List.mem_assoc "cascade" l | _ -> false
+let keys = [ "cascade"; "dimension"; "functions"; "offsets"; "motion" ]
+let is_cascade section = part "cascade" section <> None
 let of_int i = Number.of_z (Z.of_int i)
 
 (* what bounds the roots of a function at the begin; and the entry without that, as that of other agents *)
 let roots_of v =
-  let get = fields "a function that is used" [ "function"; "inputs"; "initial"; "drive" ] v in
+  let get = fields "a function that is used" ~may:[ "inputs"; "initial"; "drive" ] [ "function" ] v in
   let one key = optional number key (get key) in
   let roots = match one "initial", one "drive" with
     | Some x, Some y -> Some (x, y) | None, None -> None | _ -> bad "initial and drive are told both, or none" in
-  roots, Obj [ "function", get "function"; "inputs", get "inputs" ]
+  roots, Obj (List.filter (fun (_, x) -> x <> Null) [ "function", get "function"; "inputs", get "inputs" ])
 
 (* not below the root, to many bits; the check verifies it *)
 let root (q : q) =
@@ -42,7 +42,7 @@ let thrust_of team : thrusts =
   { of_functions = List.map of_function team.used; speeds = List.init team.graph.order speeds }
 
 let certificate section json : t =
-  let get = fields "agents" keys section in
+  let get = fields "agents" ~may:[ "initial_state"; "final_state"; "input" ] keys section in
   let r = Agents.graph_of json in
   let dimension = Agents.count "dimension" (get "dimension") in
   let alpha = Agents.short "cascade" (number "cascade" (get "cascade")) in
@@ -54,10 +54,7 @@ let certificate section json : t =
   need (Number.compare force (of_int 1000) <= 0) "alpha rho1 T is above 1000";
   let proof = { rest = r.rest; checked = []; unchecked = [] } in
   let told, entries_ = List.split (List.map roots_of (entries "functions" (get "functions"))) in
-  let listed = match json with
-    | Obj l -> (match List.assoc_opt "lyapunov" l with Some (Obj l) -> entries "functions" (List.assoc "functions" l) | _ -> []) | _ -> [] in
-  let is_full k = match List.nth listed k with Obj l -> List.assoc_opt "class" l = Some (Str "full") | _ -> false in
-  let used, funcs = Agents.functions r proof is_full (Arr entries_) in
+  let used, funcs = Agents.functions r proof (Arr entries_) in
   need (used <> [] || r.cert.edges = []) "what was proved makes another verdict";
   let begins = get "initial_state" <> Null in
   need (List.for_all (fun x -> (x <> None) = begins) told) "initial values are told iff there are initial states";
@@ -88,7 +85,7 @@ let certificate section json : t =
         let get = fields "input" [ "agents"; "largest" ] v in
         let tops = by_agent r.nodes number "input" (get "agents") in
         need (Number.equal (number "largest" (get "largest")) (largest tops)) "the largest input is another"; tops in
-  (match json with Obj l when List.mem_assoc "instants" l -> skipped proof "agent-instants" "instants" | _ -> ());
+  if part "instants" json <> None then skipped proof "agent-instants" "instants";
   need (proof.rest = []) "an obligation that nothing asks for";
   let slope = r.cert.rho1 in
   let cert = { r.cert with funcs; rho1 = if Z.sign slope.qnum = 0 then Number.one else slope } in

@@ -9,12 +9,15 @@ let map f l = List.rev (List.rev_map f l)
 let entries what = function Arr l -> l | _ -> bad (what ^ ": an array is due")
 let text what = function Str s -> s | _ -> bad (what ^ ": a text is due")
 let truth what = function Bool b -> b | _ -> bad (what ^ ": true or false is due")
-(* an object with exactly these keys, as a function from keys to values *)
-let fields what keys = function
-  | Obj l ->
-      List.iter (fun k -> if not (List.mem_assoc k l) then bad (Printf.sprintf "%s: the key %S is missing" what k)) keys;
-      List.iter (fun (k, _) -> if not (List.mem k keys) then bad (Printf.sprintf "%s: the key %S is unknown" what k)) l;
-      fun k -> List.assoc k l
+let part key = function Obj l -> List.assoc_opt key l | _ -> None
+(* an object with exactly these keys, and some of those that it may have, as a function from keys to values: [Null] of a key
+   that is absent, since none is there with null *)
+let fields what ?(may = []) keys = function
+  | Obj l as v ->
+      let wrong k how = bad (Printf.sprintf "%s: the key %S is %s" what k how) in
+      List.iter (fun k -> if not (List.mem_assoc k l) then wrong k "missing") keys;
+      List.iter (fun (k, x) -> if not (List.mem k keys || List.mem k may) then wrong k "unknown" else if x = Null then wrong k "null") l;
+      fun k -> Option.value (part k v) ~default:Null
   | _ -> bad (what ^ ": an object is due")
 let beside = function Obj l -> (match List.assoc_opt "count" l with Some (Num _) -> true | _ -> false) | _ -> false
 let need ok what = if not ok then bad what
@@ -117,22 +120,30 @@ let line_text s =
 (* the obligations of the proof, taken one after the other *)
 type proof = { mutable rest : Json.t list; mutable checked : (string * string) list; mutable unchecked : (string * string) list }
 let proof_of v = { rest = entries "proof" v; checked = []; unchecked = [] }
-let following p = match p.rest with Obj l :: _ -> (match List.assoc_opt "kind" l with Some (Str s) -> s | _ -> "") | _ -> ""
-let following_witness p = match p.rest with Obj l :: _ -> Option.value (List.assoc_opt "witness" l) ~default:Null | _ -> Null
+let following p = match p.rest with o :: _ -> (match part "kind" o with Some (Str s) -> s | _ -> "") | [] -> ""
+let following_witness p = match p.rest with o :: _ -> Option.value (part "witness" o) ~default:Null | [] -> Null
+let obligation what o =
+  let get = fields what ~may:[ "numbers"; "witness" ] [ "kind"; "of"; "proves"; "lemma" ] o in
+  (match get "numbers" with
+   | Null -> () | Obj (_ :: _ as l) -> List.iter (fun (k, x) -> ignore (text (what ^ ": " ^ k) x)) l
+   | _ -> bad (what ^ ": numbers are an object, or absent"));
+  get
 (* the next obligation, which must be this one: its numbers, and its witness *)
 let take p kind of_ keys =
   match p.rest with
   | [] -> bad (Printf.sprintf "the proof does not list %s of %s" kind of_)
   | o :: rest ->
       let what = kind ^ " of " ^ of_ in
-      let get = fields ("an obligation, " ^ what) [ "kind"; "of"; "proves"; "lemma"; "numbers"; "witness" ] o in
+      let get = obligation ("an obligation, " ^ what) o in
       let proves, lemma = try List.assoc kind Texts.obligations with Not_found -> bad ("an unknown obligation " ^ kind) in
       need (get "kind" = Str kind && get "of" = Str of_ && get "proves" = Str proves && get "lemma" = Str lemma)
         ("the proof lists another obligation than " ^ what);
       p.rest <- rest;
       (match keys with
        | None -> (fun _ -> Number.zero), get "witness"
-       | Some keys -> let n = fields ("numbers of " ^ what) keys (get "numbers") in (fun k -> number k (n k)), get "witness")
+       | Some keys ->
+           let n = fields ("numbers of " ^ what) keys (match get "numbers" with Null -> Obj [] | v -> v) in
+           (fun k -> number k (n k)), get "witness")
 let proved p kind of_ keys =
   let n, w = take p kind of_ (Some keys) in p.checked <- (kind, of_) :: p.checked; n, w
 (* says of the last obligation what the theorem says, where that is not all of its fixed text *)
@@ -142,5 +153,13 @@ let bare p kind of_ keys =
 (* without numbers and witness *)
 let bare_of p kind of_ = let _ : string -> Checker.q = bare p kind of_ [] in ()
 let skipped p kind of_ = ignore (take p kind of_ None); p.unchecked <- (kind, of_) :: p.unchecked
-(* of a part that is not read *)
-let unknown p kind of_ = p.rest <- List.tl p.rest; p.unchecked <- (kind, of_) :: p.unchecked
+(* kinds of obligations and what they are of have these letters alone: what is printed of them can be no other line *)
+let named = String.for_all (function 'a' .. 'z' | '0' .. '9' | '-' | '.' | '[' | ']' -> true | _ -> false)
+(* all that are left: of parts that are not read *)
+let others p of_part =
+  List.iter (fun o ->
+    let get = obligation "an obligation" o in
+    match get "kind", get "of" with
+    | Str k, Str o when of_part k && named k && named o -> p.unchecked <- (k, o) :: p.unchecked
+    | _ -> bad "an obligation that nothing asks for") p.rest;
+  p.rest <- []

@@ -11,7 +11,6 @@ let claim proof kind keys reading =
   match reading numbers witness with
   | Some e -> proof.checked <- (kind, "input") :: proof.checked; [ e ]
   | None -> proof.unchecked <- (kind, "input") :: proof.unchecked; []
-let witness proof = match proof.rest with Obj l :: _ -> List.assoc_opt "witness" l | _ -> None
 
 (* the number of a Lyapunov function *)
 let index kind functions v =
@@ -56,14 +55,14 @@ let path_length proof (functions : func list) begins v =
 (* two matrices, where [e^-p] is known well enough up to [p = 40]; or a function, in pieces up to an instant *)
 let energy proof triangle (functions : func list) begins v =
   let most = number "energy" v in
-  match witness proof, begins with
-  | Some (Obj _), At_rest _ ->
+  match following_witness proof, begins with
+  | Obj _, At_rest _ ->
       claim proof "input-energy" [ "p"; "m0"; "m1" ] (fun numbers witness ->
         let get = fields "the witness" [ "W0"; "W1" ] witness in
         let p = numbers "p" in
         if Number.compare p (Number.of_z (Z.of_int 40)) > 0 then None
         else Some (Energy (most, triangle "W0" (get "W0"), triangle "W1" (get "W1"), numbers "m0", numbers "m1", p)))
-  | Some (Num _), Moving _ ->
+  | Num _, Moving _ ->
       claim proof "input-energy" [ "z" ] (fun numbers witness ->
         let way = index "input-energy" functions witness, numbers "z" in
         if known begins functions way then Some (EnergyBy (most, way)) else None)

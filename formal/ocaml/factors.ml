@@ -5,7 +5,7 @@ open Json
 open Document
 module Z = Number.Z
 
-let keys = [ "order"; "indptr"; "indices"; "data"; "exponents"; "bits"; "power"; "weights"; "parents" ]
+let keys = [ "order"; "indptr"; "indices"; "data"; "exponents"; "bits"; "power" ]
 let largest_shift = 65_536 and largest_bits = 400_000_000
 let small what v = match v with Num s when String.length s <= 18 -> int_of_string s | _ -> bad (what ^ ": an integer of at most 18 digits is due")
 let ints what count v = map (fun z -> if Z.fits_int z then Z.to_int z else bad (what ^ ": an integer is too large")) (integers what count v)
@@ -38,7 +38,7 @@ let ratios (weights : q array) own = List.map2 (fun i z -> i, z) own (fst (in_ra
 let same number rate ratios (f : fact) = f.whose = number && Number.equal f.decays rate
   && List.for_all2 (fun (i, a) (j, b) -> i = j && Z.equal a b) f.ratios ratios
 let of_group (edges : edge list) number (one : comp) weights rate v : fact =
-  let get = fields "factor" keys v in
+  let get = fields "factor" ~may:[ "weights"; "parents" ] keys v in
   let own = Array.of_list one.nodes in
   let gauge = match one.camps with Gauge g -> Some (Array.of_list g) | Cycle _ -> None in
   let m = Array.length own in

@@ -9,80 +9,19 @@ type t = { nodes : nodes; family : family; hints : hint list; whys : why option 
   unchecked : (string * string) list; sections : string list }
 
 let most_nodes = 400
-let most_modes = 1000
 let most_functions = 1000
 (* entries of the matrices of all rates: so much is formed and factorised *)
 let most_work = 30_000_000
 
-let is_family = function
-  | Obj l -> (match List.assoc_opt "graph" l with Some (Obj g) -> List.mem_assoc "modes" g | _ -> false)
-  | _ -> false
-
-(* * The modes *)
-let sign_of_bounds low high = if Z.sign high.qnum <> 0 then Z.sign high.qnum else -1
-let edge_of nodes v = match entries "an edge" v with
-  | s :: t :: rest ->
-      let low, high = match rest with
-        | [ w ] -> let w = number "a weight" w in w, w
-        | [ a; b ] ->
-            let a = number "a weight" a and b = number "a weight" b in
-            need (Number.compare a b < 0) "an edge: least < largest is due"; a, b
-        | _ -> bad "an edge has three or four entries" in
-      need (Z.sign low.qnum * Z.sign high.qnum >= 0 && (Z.sign low.qnum <> 0 || Z.sign high.qnum <> 0)) "an edge: weights of two signs, or none";
-      let s = node nodes "an edge" s and t = node nodes "an edge" t in
-      need (s <> t) "an edge from a node to itself";
-      { head = t; tail = s; bottom = low; top = high; mutual = false }
-  | _ -> bad "an edge has three or four entries"
-let sign e = sign_of_bounds e.bottom e.top
-let known e = Number.equal e.bottom e.top
-let may_fail e = Z.sign e.bottom.qnum = 0 || Z.sign e.top.qnum = 0
-let mode_of nodes v =
-  let get = fields "a mode" [ "name"; "undirected"; "edges" ] v in
-  ignore (text "the name of a mode" (get "name"));
-  let paired = truth "undirected" (get "undirected") in
-  if beside (get "edges") then unsupported "a family with edges in side files";
-  let edges = map (edge_of nodes) (entries "edges" (get "edges")) in
-  ignore (List.fold_left (fun last e ->
-    let at = (e.head, e.tail, sign e) in need (compare last at < 0) "edges are in another order"; at) (-1, -1, 0) edges);
-  Number.limited "edges" (List.concat_map (fun e -> [ e.bottom; e.top ]) edges);
-  let table = Hashtbl.create 64 in
-  List.iter (fun e ->
-    let at = (e.head, e.tail) in
-    (match Hashtbl.find_opt table at with
-     | Some f -> need (may_fail e && may_fail f) "two edges of one pair of nodes, of which one cannot fail" | None -> ());
-    Hashtbl.add table at e) edges;
-  if paired then List.iter (fun e -> need (List.exists (fun f -> Number.equal f.bottom e.bottom && Number.equal f.top e.top)
-    (Hashtbl.find_all table (e.tail, e.head))) "undirected: an edge without its reverse") edges;
-  let ties = if paired then List.filter_map (fun e -> if e.tail < e.head then Some { e with mutual = true } else None) edges else edges in
-  paired, edges, ties
-let hash nodes modes =
-  let name i = nodes.labels.(i) in
-  let line e =
-    let ends = Printf.sprintf "%s, %s" (line_text (name e.tail)) (line_text (name e.head)) in
-    if known e then Printf.sprintf "[%s, \"%s\"]\n" ends (Number.text e.top)
-    else Printf.sprintf "[%s, \"%s\", \"%s\"]\n" ends (Number.text e.bottom) (Number.text e.top) in
-  let of_mode (paired, edges, _) =
-    (if paired && not (List.for_all known edges) then "{\"undirected\": true}\n" else "")
-    ^ String.concat "" (List.map line (List.sort (fun a b -> compare (name a.tail, name a.head, sign a) (name b.tail, name b.head, sign b)) edges)) in
-  Sha256.hex (String.concat "" (List.map (fun s -> "[" ^ line_text s ^ "]\n") (List.sort compare (Array.to_list nodes.labels)))
-    ^ String.concat "{}\n" (List.map of_mode modes))
-
 (* the mandatory graph of a mode with the components that are listed *)
 let mandatory nodes ties structure =
-  let get = fields "structure" [ "connectivity"; "closed_components"; "leaders"; "followers"; "balanced"; "sign_symmetric" ] structure in
   let n = Array.length nodes.labels in
-  let listed, _ = Reader.listed_components nodes get in
+  let get, listed, _ = Reader.listed_components nodes structure in
   let comps = Reader.without_weights nodes listed in
   let edges = smallest ties in
-  let all = Pieces.graph n edges in
-  let found = Pieces.find all in
-  let pieces = List.map (Pieces.piece all comps) found.pieces in
-  let kind = match pieces with [ p ] -> Pieces.connectivity p | _ -> "disconnected" in
-  need (get "connectivity" = Str kind) ("structure: the mandatory graph is " ^ kind);
-  need (get "balanced" = Bool (match found.balance with Gauge _ -> true | Cycle _ -> false)) "structure: balance of a mandatory graph";
-  need (get "sign_symmetric" = Bool (Pieces.sign_symmetric all)) "structure: sign symmetry";
+  let all, all_balanced, pieces = Pieces.whole n edges comps get in
   { order = n; edges; kind = Nominal Number.one; rho1 = Number.one; rho2 = Number.one; kappa = Number.one; comps; pieces;
-    all_balanced = found.balance; sign_symmetric = Pieces.sign_symmetric all; funcs = []; start = []; sliding = []; final = [];
+    all_balanced; sign_symmetric = Pieces.sign_symmetric all; funcs = []; start = []; sliding = []; final = [];
     enclosed = true; margins = []; leaders = []; upper_bound = None; proved = None; best_diagonal = None; best_overshoot = None;
     bounded_input = false; reaching = []; sliding_input = []; efforts = []; degenerate = None; start_box = None }
 
@@ -90,8 +29,8 @@ let mandatory nodes ties structure =
 let outcomes = [ "stability", Stability; "bipartite consensus", Consensus; "interval bipartite consensus", Interval;
   "bipartite containment", Containment; "depends on the signal", Depends ]
 let claim v =
-  let get = fields "claim" [ "theorem"; "behaviour"; "signal" ] v in
-  need (get "theorem" = Str "common kernel" && get "signal" = Str "any") "claim: another theorem or signal";
+  let get = fields "claim" [ "theorem"; "behaviour" ] v in
+  need (get "theorem" = Str "common kernel") "claim: another theorem";
   let b = text "behaviour" (get "behaviour") in
   try List.assoc b outcomes with Not_found -> bad "claim: an unknown behaviour"
 (* closed components of the first mode by number, and the columns of the balanced ones *)
@@ -142,7 +81,7 @@ let why_of nodes modes part witness =
     need (witness = Null) "family-claim: a witness that nothing asks for";
     Some (Counts (place most, place least)) end
   else begin
-    let get = fields "the witness" [ "mode"; "other"; "edge"; "state" ] witness in
+    let get = fields "the witness" ~may:[ "edge" ] [ "mode"; "other"; "state" ] witness in
     let mode key = let k = integer key (get key) in
       need (Z.sign k >= 0 && Z.compare k (Z.of_int (List.length modes)) < 0) "family-claim: an unknown mode"; Z.to_int k in
     let one = mode "mode" and other = mode "other" in
@@ -157,7 +96,7 @@ let why_of nodes modes part witness =
       | v -> (match entries "edge" v with
           | [ s; t; sg ] ->
               let s = node nodes "edge" s and t = node nodes "edge" t and sg = integer "edge" sg in
-              let fits e = not (known e) && Z.equal sg (Z.of_int (sign e))
+              let fits e = not (Reader.known e) && Z.equal sg (Z.of_int (Reader.sign e))
                 && ((e.tail = s && e.head = t) || (e.mutual && e.tail = t && e.head = s)) in
               (match index_of fits (List.nth modes other).ties with
                | Some j -> Some j | None -> bad "family-claim: an unknown edge, or a known weight")
@@ -184,7 +123,7 @@ let roots_of n part (q : quotient) means modes = match factor_mod n q.qsw q.qfw 
       let above d scale = Number.root (Number.div (square r q fs d) (Number.of_z (Z.mul scale scale))) in
       List.map (fun m ->
         let dq = middle_common m.ties in
-        List.map (fun e -> if known e || not (here e.head) then Number.zero else above (hvec e) Z.one) m.ties,
+        List.map (fun e -> if Reader.known e || not (here e.head) then Number.zero else above (hvec e) Z.one) m.ties,
         List.init n (fun i -> if here i then above (mid_row dq m.ties (List.init (i + 1) (fun j -> if i = j then Z.one else Z.zero))) dq else Number.zero)
         @ List.map (fun (u, _) -> let d = common u in above (mid_row dq m.ties (List.map (scaled d) u)) dq) means) modes
 (* the weights of a mode that have a multiplier: those that move what is left to the states at rest *)
@@ -196,11 +135,11 @@ let moving part n =
   let entry j k = (* column j of C at k, which is no pivot *)
     if pivot j then Number.sub Number.zero (of_pivot j k) else if j = k then Number.one else Number.zero in
   let rows = List.filter (fun k -> not (pivot k)) part.its_agents in
-  fun e -> here e.head && not (known e)
+  fun e -> here e.head && not (Reader.known e)
     && not (pivot e.head && pivot e.tail)
     && List.exists (fun k ->
          let a = if here e.head then entry e.head k else Number.zero in
-         let a = if e.mutual then Number.sub a (Number.mul (Number.of_z (Z.of_int (sign e))) (entry e.tail k)) else a in
+         let a = if e.mutual then Number.sub a (Number.mul (Number.of_z (Z.of_int (Reader.sign e))) (entry e.tail k)) else a in
          Z.sign a.qnum <> 0) rows
 let component_of parts v =
   let z = integer "component" v in
@@ -244,7 +183,7 @@ let mean_of nodes part v =
   List.init n (fun i -> Option.value (List.assoc_opt i weights) ~default:Number.zero), number "constant" (get "constant")
 let form_of nodes parts modes proof work k v =
   let n = Array.length nodes.labels in
-  let of_ = Printf.sprintf "lyapunov.functions[%d]" k in
+  let of_ = Printf.sprintf "decays[%d]" k in
   let get = fields "a Lyapunov function" [ "class"; "component"; "nodes"; "lower_triangle"; "rate"; "inputs"; "coordinates"; "means" ] v in
   need (List.mem (text "class" (get "class")) [ "full"; "diagonal"; "undirected" ]) "an unknown class";
   let part = component_of parts (get "component") in
@@ -284,48 +223,34 @@ let form_of nodes parts modes proof work k v =
     offs = spread own "coordinates" (get "coordinates"); means } in
   b, { multipliers; roots = roots_of n part q means modes }
 let lyapunov_of nodes parts modes proof work k v =
-  match v with
-  | Obj l when List.assoc_opt "class" l = Some (Str "rows") -> rows_of nodes parts modes proof (Printf.sprintf "lyapunov.functions[%d]" k) v
-  | Obj l when List.assoc_opt "class" l = Some (Str "squares") -> unsupported "a family with a function of squares"
+  match part "class" v with
+  | Some (Str "rows") -> rows_of nodes parts modes proof (Printf.sprintf "decays[%d]" k) v
+  | Some (Str "squares") -> unsupported "a family with a function of squares"
   | _ -> form_of nodes parts modes proof work k v
 
 (* * The document *)
-let keys = ("restricted", "signals that are restricted") :: Reader.besides
 let certificate (j : Json.t) : t =
-  let there key = match j with Obj l -> List.mem_assoc key l | _ -> false in
-  let more = List.filter (fun (key, _) -> there key) keys in
-  let get = fields "the certificate" (Reader.keys @ List.map fst more @ List.filter there [ "boxes"; "components" ]) j in
+  let may = [ "claim"; "components"; "drives"; "final_state"; "reaching_time"; "messages"; "boxes"; "restricted" ] in
+  let get = Reader.opened ~may [ "input" ] j in
   let left = ref [] in
   let not_checked s = left := s :: !left in
-  List.iter (fun (key, what) -> not_checked (Printf.sprintf "%s, all that is said of %s" key what)) more;
-  ignore (text "producer" (get "producer"));
-  need (match get "unverified" with Obj _ -> true | _ -> false) "unverified is not an object";
-  let outside = match j with Obj l -> List.filter (fun (k, _) -> k <> "digest" && k <> "unverified") l | _ -> [] in
-  need (get "digest" = Str (hashed (Obj outside))) "digest: the certificate was changed after it was made";
-  List.iter (fun key -> need (get key = Null) (key ^ " of a family")) [ "paper"; "rates"; "overshoot"; "influence" ];
-  let graph = fields "graph" [ "nodes"; "modes"; "sha256" ] (get "graph") in
-  let nodes = nodes_of (graph "nodes") in
+  let more = Reader.set_apart get not_checked [ "restricted", "signals that are restricted"; Reader.messages ] in
+  let nodes, read, sha256, (kind, rho1, rho2, kappa), start, sliding = Reader.problem true (get "problem") in
   let n = Array.length nodes.labels in
   if n > most_nodes then unsupported (Printf.sprintf "a family of more than %d nodes" most_nodes);
-  let listed = entries "modes" (graph "modes") in
-  need (listed <> [] && List.length listed <= most_modes) "graph.modes: 1 to 1,000 are due";
-  let read = map (mode_of nodes) listed in
-  let sha256 = hash nodes read in
-  need (graph "sha256" = Str sha256) "graph: another SHA-256 than that of the modes";
-  let structures = entries "structure.modes" ((fields "structure" [ "modes" ] (get "structure")) "modes") in
-  need (List.length structures = List.length read) "structure.modes: one for each mode";
+  let structures = entries "structure" (get "structure") in
+  need (List.length structures = List.length read) "structure: one for each mode";
   let modes = List.map2 (fun (_, _, ties) s -> { ties; mandatory = mandatory nodes ties s }) read structures in
-  let kind, rho1, rho2, kappa = Reader.protocol (get "protocol") in
   let is_sliding = match kind with SlidingMode _ -> true | Nominal _ -> false in
   let proof = proof_of (get "proof") in
   List.iteri (fun i _ -> bare_of proof "structure" (Printf.sprintf "graph.modes[%d]" i)) modes;
   (* camps that fit all edges of all modes *)
-  let every = List.concat_map (fun (_, edges, _) -> List.map (fun e -> { tgt = e.head; src = e.tail; wt = Number.of_z (Z.of_int (sign e)) }) edges) read in
+  let every = List.concat_map (fun (_, edges, _) -> List.map (fun e -> { tgt = e.head; src = e.tail; wt = Number.of_z (Z.of_int (Reader.sign e)) }) edges) read in
   let found = (Pieces.find (Pieces.graph n every)).pieces in
   let claims = match found with
-    | [ _ ] -> need (not (there "components")) "components of a connected family"; [ claim (get "claim") ]
+    | [ _ ] -> need (get "components" = Null) "components of a connected family"; [ claim (get "claim") ]
     | _ ->
-        need (get "claim" = Null && there "components") "claim: the family is not connected";
+        need (get "claim" = Null) "claim: the family is not connected";
         let l = entries "components" (get "components") in
         need (List.length l = List.length found) "components: one for each weak component";
         List.map2 (fun v (own, _) ->
@@ -338,27 +263,18 @@ let certificate (j : Json.t) : t =
   let parts = List.map2 (fun ((own, camps), becomes) w ->
     { its_agents = own; becomes; still = columns nodes first own camps becomes w }) (List.combine found claims) witnesses in
   let whys = List.map2 (why_of nodes modes) parts witnesses in
-  let sliding = match get "sliding_variable" with Null -> [] | v -> by_agent nodes number "sliding_variable" v in
-  let drives = List.exists (fun x -> not (Number.equal x Number.zero)) sliding in
-  let lyapunov = fields "lyapunov" ("functions" :: if drives then [ "drives" ] else []) (get "lyapunov") in
-  let functions = entries "functions" (lyapunov "functions") in
-  need (List.length functions <= most_functions) "lyapunov.functions: more than 1,000";
+  let moving = List.exists (fun x -> not (Number.equal x Number.zero)) sliding in
+  let functions = entries "decays" (get "decays") in
+  need (List.length functions <= most_functions) "decays: more than 1,000";
   let work = ref 0 in
   let bounds = List.mapi (lyapunov_of nodes parts modes proof work) functions in
-  let start = match get "initial_state" with Null -> None | v -> Some (by_agent nodes number "initial_state" v) in
-  need (is_sliding = (get "sliding_variable" <> Null)) "sigma(0) belongs to the sliding-mode protocol, and is part of it";
-  let reaching = if is_sliding then begin
-    let times = fields "reaching_time" [ "bound"; "clock"; "z" ] (get "reaching_time") in
-    need (times "bound" = Str Texts.sliding_bound && times "clock" = Str Texts.sliding_clock) "reaching_time: another bound or clock";
-    bare_of proof "sliding-bound" "protocol";
-    Reader.reaching_times proof kind kappa sliding (by_agent nodes (optional number) "reaching_time.z" (times "z")) not_checked end
-  else (need (get "reaching_time" = Null) "reaching times without sliding variables"; []) in
-  if drives then begin
-    need (List.length (entries "drives" (lyapunov "drives")) = List.length functions) "drives: one for each function";
-    not_checked "lyapunov.drives";
-    List.iteri (fun k _ -> skipped proof "family-drive" (Printf.sprintf "lyapunov.functions[%d]" k)) functions end;
+  let reaching = Reader.reaching_times nodes proof kind kappa sliding (get "reaching_time") not_checked in
+  if moving then begin
+    need (List.length (entries "drives" (get "drives")) = List.length functions) "drives: one for each function";
+    not_checked "drives";
+    List.iteri (fun k _ -> skipped proof "family-drive" (Printf.sprintf "decays[%d]" k)) functions end
+  else need (get "drives" = Null) "drives where no sliding variable moves";
   need ((start = None) = (get "final_state" = Null)) "a final state without an initial state, or none";
-  let moving = drives in
   (* of every part what is known of its ends; none if they are not proved *)
   let base = { frame = { first with start = Option.value start ~default:[] }; modes; parts; bounds = List.map fst bounds; ends = []; stays = false; peaks = []; boxes = [] } in
   let ends, facts = match start with
@@ -381,30 +297,25 @@ let certificate (j : Json.t) : t =
         let ok = Pieces.inside n (List.concat_map (fun t -> if proved_ t then (fst t).its_agents else []) told) in
         List.mapi (fun i e -> if ok i then e else None) read,
         List.mapi (fun i (p, k) -> i, k @ (if moving then [] else Limits.near base p)) told in
-  let input = fields "input" ([ "bounded"; "peaks" ] @ if is_sliding then [ "sliding" ] else []) (get "input") in
+  let input = fields "input" ~may:[ "bounded"; "peaks" ] (if is_sliding then [ "sliding" ] else []) (get "input") in
   let sliding_input = if not is_sliding then [] else begin
-    let part = fields "input.sliding" [ "bounded"; "agents" ] (input "sliding") in
-    ignore (truth "input.sliding.bounded" (part "bounded")); not_checked "input.sliding.bounded";
-    if part "agents" = Null then [] else (bare_of proof "input-sliding" "input"; by_agent nodes number "input.sliding.agents" (part "agents")) end in
+    let told = fields "input.sliding" ~may:[ "agents" ] [ "bounded" ] (input "sliding") in
+    ignore (truth "input.sliding.bounded" (told "bounded")); not_checked "input.sliding.bounded";
+    if told "agents" = Null then [] else (bare_of proof "input-sliding" "input"; by_agent nodes number "input.sliding.agents" (told "agents")) end in
   let stays, peaks = match input "bounded" with
     | Null -> need (input "peaks" = Null) "peaks of an input that may grow"; false, []
     | b ->
-        need (truth "input.bounded" b) "input.bounded is true, or null";
+        need (truth "input.bounded" b) "input.bounded is true, or absent";
         let slow = match kind with
-          | SlidingMode (_, _, _, _, mu3, _) -> drives && Number.compare (Number.mul mu3 kappa) Number.one < 0 | Nominal _ -> false in
+          | SlidingMode (_, _, _, _, mu3, _) -> moving && Number.compare (Number.mul mu3 kappa) Number.one < 0 | Nominal _ -> false in
         if input "peaks" = Null then (need (start = None || slow) "input.peaks are due"; bare_of proof "family-input" "input"; true, [])
         else if moving then (skipped proof "family-input" "input"; not_checked "input.peaks"; true, [])
         else (need (start <> None) "peaks without an initial state"; bare_of proof "family-input" "input"; true, by_agent nodes number "input.peaks" (input "peaks")) in
-  let boxes = if not (there "boxes") then [] else begin
+  let boxes = if get "boxes" = Null then [] else begin
     need (start <> None && not moving) "boxes without an initial state, or while sliding variables move";
     Limits.boxes nodes modes parts proof (get "boxes") end in
   let hull = match start with Some x when not moving && (boxes <> [] || facts <> []) -> Limits.hull_of modes x | _ -> [], [] in
-  let rest o = match o with
-    | Obj l -> (match List.assoc_opt "kind" l, List.assoc_opt "of" l with
-        | Some (Str k), Some (Str o) when more <> [] && Reader.named k && Reader.named o -> unknown proof k o
-        | _ -> bad "an obligation that nothing asks for")
-    | _ -> bad "an obligation is not an object" in
-  while proof.rest <> [] do rest (List.hd proof.rest) done;
+  others proof (fun _ -> more);
   need (get "verdict" = Str "certified") "verdict: a family is certified";
   let frame = { first with edges = []; comps = []; pieces = []; kind; rho1; rho2; kappa; start = Option.value start ~default:[]; sliding;
     reaching; sliding_input } in
@@ -414,11 +325,11 @@ let certificate (j : Json.t) : t =
 
 (* the parts of the check one by one, to name the first that fails *)
 let of_family (f : family) hs ws l : (string * (unit -> bool)) list =
-  [ "protocol, or what is said of sliding variables", (fun () -> check_frame f) ]
+  [ "gain, or what is said of sliding variables", (fun () -> check_frame f) ]
   @ List.mapi (fun i m -> Printf.sprintf "structure of graph.modes[%d]" i, (fun () -> check_mode f m)) f.modes
   @ List.mapi (fun i (p, w) -> Printf.sprintf "family-claim of graph, component %d" i,
       (fun () -> check_part f p && check_pivots f p && check_depends f p w)) (List.combine f.parts ws)
-  @ List.mapi (fun i (b, h) -> Printf.sprintf "lyapunov.functions[%d]" i, (fun () -> check_bound f b h)) (List.combine f.bounds hs)
+  @ List.mapi (fun i (b, h) -> Printf.sprintf "decays[%d]" i, (fun () -> check_bound f b h)) (List.combine f.bounds hs)
   @ [ "family-final-state of final_state", (fun () -> check_family_ends f l.hull l.told);
       "family-input of input", (fun () -> check_stays f && check_peaks f);
       "boxes", (fun () -> check_boxes f l.hull) ]

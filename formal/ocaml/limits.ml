@@ -74,7 +74,7 @@ let boxes nodes modes (parts : part list) proof v =
   let last = ref (false, -1) in
   List.mapi (fun k v ->
     let of_ = Printf.sprintf "boxes[%d]" k in
-    let drawn = match v with Obj l -> List.mem_assoc "nodes" l | _ -> false in
+    let drawn = part "nodes" v <> None in
     let get = fields "a box" (if drawn then [ "component"; "nodes"; "vector"; "lower"; "upper"; "rate" ] else [ "component"; "lower"; "upper" ]) v in
     let number_ = integer "component" (get "component") in
     need (Z.sign number_ >= 0 && Z.lt number_ (Z.of_int (List.length parts))) "component: there is no such";

@@ -72,7 +72,7 @@ let leaders s proof blocks =
     ([], [], []) blocks
 
 let read s nodes proof v =
-  let section = fields "paper" [ "theorem"; "objective"; "coordinates"; "blocks"; "rho"; "rho_interval"; "rate"; "overshoot" ] v in
+  let section = fields "paper" ~may:[ "rho"; "rho_interval"; "rate"; "overshoot" ] [ "theorem"; "objective"; "coordinates"; "blocks" ] v in
   let objective, coordinates, expected = row s in
   need (section "theorem" = Str s.theorem && section "objective" = Str objective) "paper: another theorem or objective";
   need (section "coordinates" = Str coordinates) "paper: other coordinates";
@@ -122,7 +122,7 @@ let read s nodes proof v =
           | None, Null -> []
           | None, _ | Some _, Null -> bad "paper.rho_interval: there iff there are rate and rho"
           | Some rho, v ->
-              let get = fields "rho_interval" [ "printed"; "exact" ] v in
+              let get = fields "rho_interval" ~may:[ "printed"; "exact" ] [] v in
               (match optional number "printed" (get "printed"), optional number "exact" (get "exact") with
                | None, None ->
                    let fixed = List.concat_map (fun (_, own, _, t) -> if t then [] else own) blocks in

@@ -2,12 +2,12 @@
 open Checker
 let of_check c d : (string * (unit -> bool)) list =
   [ "graph: an edge", (fun () -> check_edges c d.dls);
-    "protocol: a parameter", (fun () -> check_protocol c);
-    "structure of graph", (fun () -> check_structure c);
+    "gain: a parameter", (fun () -> check_protocol c);
+    "structure of graph.modes[0]", (fun () -> check_structure c);
     "final-state of graph", (fun () -> check_end c d);
     "final-state of graph: where the components end", (fun () -> check_behaviour c d);
     "claim of graph", (fun () -> check_claims c d) ]
-  @ List.mapi (fun k f -> Printf.sprintf "lyapunov.functions[%d]" k, (fun () -> check_function c d f)) c.funcs
+  @ List.mapi (fun k f -> Printf.sprintf "decays[%d]" k, (fun () -> check_function c d f)) c.funcs
   @ [ "final-state of graph: no Lyapunov function proves that it is reached", (fun () -> check_reached c d);
       "final_state: not what was proved", (fun () -> check_final c d);
       "influence.degenerate: other components end at 0", (fun () -> check_degenerate c d);
@@ -26,8 +26,8 @@ let of_check c d : (string * (unit -> bool)) list =
       (fun () -> check_effort c d e)) c.efforts
 let of_large (h : hints) c : (string * (unit -> bool)) list =
   [ "graph: an edge", (fun () -> check_edges c (common (List.map (fun e -> e.wt) c.edges)));
-    "protocol: a parameter", (fun () -> check_protocol c);
-    "structure of graph", (fun () -> wide_structure c);
+    "gain: a parameter", (fun () -> check_protocol c);
+    "structure of graph.modes[0]", (fun () -> wide_structure c);
     "claim of graph", (fun () -> wide_claims c);
     "dominance of a Lyapunov function", (fun () -> check_functions c h.vectors h.facts);
     "final-state of graph: no Lyapunov function proves that it is reached", (fun () -> check_moves c);

@@ -81,6 +81,16 @@ let corollaries is_sliding (p : piece) =
       p.row = 2 && p.some_balanced && fits, "3", "8";
       p.row = 2 && p.some_balanced && p.cooperative, "4", "9";
       p.row = 3 && p.some_balanced && p.cooperative, "5", "10" ]
+(* what a structure says of the whole graph, with these closed components: the graph, its balance, its weak components *)
+let whole n edges comps structure =
+  let all = graph n edges in
+  let found = find all in
+  let pieces = List.map (piece all comps) found.pieces in
+  let kind = match pieces with [ p ] -> connectivity p | _ -> "disconnected" in
+  need (structure "connectivity" = Str kind) ("structure: the graph is " ^ kind);
+  need (structure "balanced" = Bool (match found.balance with Gauge _ -> true | Cycle _ -> false)) "structure: balance of the graph";
+  need (structure "sign_symmetric" = Bool (sign_symmetric all)) "structure: sign symmetry";
+  all, found.balance, pieces
 let claim is_sliding p v =
   let get = fields "claim" [ "theorem"; "behaviour"; "corollaries" ] v in
   need (get "theorem" = Str (theorem is_sliding p)) ("claim: the theorem is " ^ theorem is_sliding p);
@@ -109,23 +119,22 @@ let compare_arrays nodes is_sliding pieces v =
 let compare_objects nodes is_sliding pieces final listed =
   need (List.length listed = List.length pieces) "components: one for each weak component";
   List.iter2 (fun v p ->
-    let get = fields "a component" [ "nodes"; "connectivity"; "claim"; "final_state" ] v in
+    let get = fields "a component" ~may:[ "final_state" ] [ "nodes"; "connectivity"; "claim" ] v in
     need (positions nodes "a component" (get "nodes") = p.members) "components: other nodes";
     need (get "connectivity" = Str (connectivity p)) "components: another connectivity";
     claim is_sliding p (get "claim");
     need (get "final_state" = part p.members final) "components: other final states than in final_state") listed pieces
 (* compares the claims of the document; returns the theorem whose row is used *)
-let compare_claims nodes is_sliding pieces kind claim_of components final =
+let compare_claims nodes is_sliding pieces claim_of components final =
   match pieces with
   | [ p ] ->
-      need (components = None) "components of a connected graph";
-      need (kind = Str (connectivity p)) ("structure: the graph is " ^ connectivity p);
+      need (components = Null) "components of a connected graph";
       claim is_sliding p claim_of; theorem is_sliding p
   | _ ->
-      need (kind = Str "disconnected" && claim_of = Null) "claim: the graph is disconnected";
+      need (claim_of = Null) "claim: the graph is disconnected";
       (match components with
-       | Some (Arr l) when List.length pieces <= in_objects -> compare_objects nodes is_sliding pieces final l
-       | Some (Obj _ as v) when List.length pieces > in_objects -> compare_arrays nodes is_sliding pieces v
+       | Arr l when List.length pieces <= in_objects -> compare_objects nodes is_sliding pieces final l
+       | Obj _ as v when List.length pieces > in_objects -> compare_arrays nodes is_sliding pieces v
        | _ -> bad "components: an array of objects, of more than 100 an object of arrays");
       let some = List.exists (fun (p : piece) -> p.some_balanced) pieces in
       (if is_sliding then "6." else "3.") ^ (if some then "1" else "2")

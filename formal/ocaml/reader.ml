@@ -8,79 +8,138 @@ module Z = Number.Z
 type t = {
   nodes : nodes; cert : cert; sha256 : string; theorem : string;
   checked : (string * string) list; unchecked : (string * string) list; sections : string list;
-  hints : Checker.hints; rest : Json.t list }
+  hints : Checker.hints; rest : Json.t list; full : int -> bool (* whether a Lyapunov function is a full matrix *) }
 
-let keys = [ "schema"; "producer"; "graph"; "structure"; "claim"; "protocol"; "paper"; "lyapunov"; "rates"; "overshoot";
-  "initial_state"; "sliding_variable"; "influence"; "final_state"; "reaching_time"; "input"; "proof"; "verdict"; "digest";
-  "unverified" ]
-(* keys of some certificates alone: their claims are of other motions, and are not read; or they are claims besides the
-   others, which keep their meaning: named, and not believed, with their obligations *)
-let not_read = [ "boxes", "a certificate of a family";
-  "restricted", "a certificate of a family"; "formation", "single integrators in a formation" ]
-let besides = [ "messages", "messages that are late, lost or rounded, and of leaders that move" ]
-(* kinds of obligations and what they are of have these letters alone: what is printed of them can be no other line *)
-let named = String.for_all (function 'a' .. 'z' | '0' .. '9' | '-' | '.' | '[' | ']' -> true | _ -> false)
-let of_besides kind = String.length kind > 5 && String.sub kind 0 5 = "late-"
+(* keys of every certificate; claims besides the others, which keep their meaning, are named, and not believed, with their
+   obligations *)
+let keys = [ "schema"; "producer"; "problem"; "structure"; "decays"; "proof"; "verdict"; "digest"; "unverified" ]
+let messages = "messages", "messages that are late, lost or rounded, and of leaders that move"
+let opened ~may more j =
+  let get = fields "the certificate" ~may (keys @ more) j in
+  ignore (text "producer" (get "producer"));
+  need (match get "unverified" with Obj _ -> true | _ -> false) "unverified is not an object";
+  let outside = match j with Obj l -> List.filter (fun (k, _) -> k <> "digest" && k <> "unverified") l | _ -> [] in
+  need (get "digest" = Str (hashed (Obj outside))) "digest: the certificate was changed after it was made"; get
+let set_apart get not_checked besides =
+  let there = List.filter (fun (key, _) -> get key <> Null) besides in
+  List.iter (fun (key, what) -> not_checked (Printf.sprintf "%s, all that is said of %s" key what)) there; there <> []
 
-let graph v =
-  let get = fields "graph" [ "nodes"; "edges"; "read"; "sha256" ] v in
-  let nodes = nodes_of (get "nodes") in
-  let asked = match get "read" with
-    | Obj l -> List.filter (fun k -> List.mem_assoc k l) [ "zeros"; "laplacian"; "columns"; "variable" ] | _ -> [] in
-  let read = fields "graph.read" ([ "orientation"; "duplicates"; "self_loops"; "undirected" ] @ asked) (get "read") in
-  need (List.mem (text "orientation" (read "orientation")) [ "information"; "listens"; "matrix" ]) "graph.read: orientation";
-  need (List.mem (text "duplicates" (read "duplicates")) [ "refused"; "sum"; "last" ]) "graph.read: duplicates";
-  let dropped s = String.length s >= 9 && String.length s <= 20 && String.sub s 0 8 = "dropped "
-    && Number.digits (String.sub s 8 (String.length s - 8)) in
-  let loops = text "self_loops" (read "self_loops") in
-  need (loops = "refused" || dropped loops) "graph.read: self_loops";
-  ignore (truth "graph.read: undirected" (read "undirected"));
-  List.iter (fun k -> match k with
-    | "zeros" -> need (dropped (text "zeros" (read k))) "graph.read: zeros"
-    | "laplacian" -> ignore (truth "graph.read: laplacian" (read k))
-    | k -> ignore (text k (read k))) asked;
+(* * What is asked: the graph in all its modes, the gain, where agents begin *)
+let is_family j = Option.bind (part "problem" j) (part "signal") <> None
+let most_modes = 1000
+let how_read v =
+  let get = fields "graph.read" ~may:[ "zeros"; "laplacian"; "columns"; "variable" ]
+    [ "orientation"; "duplicates"; "self_loops"; "undirected" ] v in
+  let said key ok = need (ok (get key)) ("graph.read: " ^ key) in
+  let among l = function Str s -> List.mem s l | _ -> false in
+  let dropped = function
+    | Str s -> String.length s >= 9 && String.length s <= 20 && String.sub s 0 8 = "dropped "
+        && Number.digits (String.sub s 8 (String.length s - 8))
+    | _ -> false in
+  said "orientation" (among [ "information"; "listens"; "matrix" ]);
+  said "duplicates" (among [ "refused"; "sum"; "last" ]);
+  said "self_loops" (fun v -> v = Str "refused" || dropped v);
+  said "undirected" (function Bool _ -> true | _ -> false);
+  said "zeros" (fun v -> v = Null || dropped v);
+  said "laplacian" (function Null | Bool _ -> true | _ -> false);
+  List.iter (fun key -> said key (function Null | Str _ -> true | _ -> false)) [ "columns"; "variable" ]
+
+let sign e = if Z.sign e.top.qnum <> 0 then Z.sign e.top.qnum else -1
+let known e = Number.equal e.bottom e.top
+let may_fail e = Z.sign e.bottom.qnum = 0 || Z.sign e.top.qnum = 0
+let edge s t bottom top =
+  let one = Z.sign bottom.qnum and other = Z.sign top.qnum in
+  need (one * other >= 0 && (one <> 0 || other <> 0)) "an edge: weights of two signs, or none";
+  need (s <> t) "an edge from a node to itself";
+  { head = t; tail = s; bottom; top; mutual = false }
+let edge_of family nodes v = match entries "an edge" v with
+  | s :: t :: weights ->
+      let bottom, top = match List.map (number "a weight") weights with
+        | [ w ] -> w, w
+        | [ a; b ] when family -> need (Number.compare a b < 0) "an edge: least < largest is due"; a, b
+        | _ -> bad "an edge has three entries, or four in a family" in
+      edge (node nodes "an edge" s) (node nodes "an edge" t) bottom top
+  | _ -> bad "an edge has three entries, or four in a family"
+(* those of a fixed graph in side files *)
+let edges_beside nodes v =
+  let get = fields "edges" [ "count"; "source"; "target"; "weight"; "scale" ] v in
+  let count = count_of v in
+  let scale = number "scale" (get "scale") in
+  need (Z.equal scale.qden Z.one && Z.sign scale.qnum > 0) "edges: the scale is no positive integer";
+  let column what = Side.column (get what) count in
+  let ends what = match column what with
+    | Side.Integers l ->
+        let n = Z.of_int (Array.length nodes.labels) in
+        List.map (fun z -> need (Z.sign z >= 0 && Z.lt z n) "edges: an unknown node"; Z.to_int z) l
+    | _ -> bad "edges: positions are integers" in
+  let weights = match column "weight" with
+    | Side.Integers l -> List.map Number.of_z l | Side.Floats l -> List.map Side.exactly l in
+  List.map2 (fun (s, t) w -> let w = Number.div w scale in edge s t w w) (List.combine (ends "source") (ends "target")) weights
+(* whether both directions of edges change together, the edges, and these with one for both directions *)
+let mode_of family nodes v =
+  let get = if family then fields "a mode" ~may:[ "undirected" ] [ "name"; "edges" ] v else fields "a mode" [ "edges" ] v in
+  if family then ignore (text "the name of a mode" (get "name"));
+  let paired = match get "undirected" with Null -> false | Bool true -> true | _ -> bad "undirected: true, or absent" in
   let edges = match get "edges" with
-    | Obj _ as v ->
-        let get = fields "edges" [ "count"; "source"; "target"; "weight"; "scale" ] v in
-        let count = match get "count" with
-          | Num s when Number.digits s && String.length s <= 9 -> int_of_string s | _ -> bad "edges: the count is no integer" in
-        let scale = number "scale" (get "scale") in
-        need (Z.equal scale.qden Z.one && Z.sign scale.qnum > 0) "edges: the scale is no positive integer";
-        let column what = Side.column (get what) count in
-        let ends what = match column what with
-          | Side.Integers l -> List.map (fun z -> need (Z.sign z >= 0 && Z.lt z (Z.of_int (Array.length nodes.labels))) "edges: an unknown node"; Z.to_int z) l
-          | _ -> bad "edges: positions are integers" in
-        let weights = match column "weight" with
-          | Side.Integers l -> List.map Number.of_z l | Side.Floats l -> List.map Side.exactly l in
-        List.map2 (fun (s, t) w -> { tgt = t; src = s; wt = Number.div w scale }) (List.combine (ends "source") (ends "target")) weights
-    | e -> List.map (fun e -> match entries "an edge" e with
-        | [ s; t; w ] -> { tgt = node nodes "an edge" t; src = node nodes "an edge" s; wt = number "a weight" w }
-        | _ -> bad "an edge has three entries") (entries "edges" e) in
+    | v when not (beside v) -> map (edge_of family nodes) (entries "edges" v)
+    | _ when family -> unsupported "a family with edges in side files"
+    | v -> edges_beside nodes v in
   ignore (List.fold_left (fun last e ->
-    let at = (e.tgt, e.src) in need (compare last at < 0) "edges are in another order"; at) (-1, -1) edges);
-  Number.limited "edges" (List.map (fun e -> e.wt) edges);
-  let name i = nodes.labels.(i) in
-  let sum = Sha256.start () in
-  List.iter (fun s -> Sha256.feed sum ("[" ^ line_text s ^ "]\n")) (List.sort compare (Array.to_list nodes.labels));
-  List.iter (fun e -> Sha256.feed sum (Printf.sprintf "[%s, %s, \"%s\"]\n" (line_text (name e.src)) (line_text (name e.tgt)) (Number.text e.wt)))
-    (List.sort (fun a b -> compare (name a.src, name a.tgt) (name b.src, name b.tgt)) edges);
-  let sha256 = Sha256.finish sum in
-  need (get "sha256" = Str sha256) "graph: another SHA-256 than that of the edges";
-  nodes, edges, sha256
+    let at = (e.head, e.tail, sign e) in need (compare last at < 0) "edges are in another order"; at) (-1, -1, 0) edges);
+  Number.limited "edges" (List.concat_map (fun e -> if known e then [ e.top ] else [ e.bottom; e.top ]) edges);
+  let table = Hashtbl.create 64 in
+  List.iter (fun e ->
+    let at = (e.head, e.tail) in
+    (match Hashtbl.find_opt table at with
+     | Some f -> need (may_fail e && may_fail f) "two edges of one pair of nodes, of which one cannot fail" | None -> ());
+    Hashtbl.add table at e) edges;
+  if paired then List.iter (fun e -> need (List.exists (fun f -> Number.equal f.bottom e.bottom && Number.equal f.top e.top)
+    (Hashtbl.find_all table (e.tail, e.head))) "undirected: an edge without its reverse") edges;
+  let ties = if paired then List.filter_map (fun e -> if e.tail < e.head then Some { e with mutual = true } else None) edges else edges in
+  paired, edges, ties
+let hash nodes modes =
+  let name i = nodes.labels.(i) and sum = Sha256.start () in
+  let feed = Sha256.feed sum in
+  let line e =
+    feed (Printf.sprintf "[%s, %s, " (line_text (name e.tail)) (line_text (name e.head)));
+    if not (known e) then feed (Printf.sprintf "\"%s\", " (Number.text e.bottom));
+    feed (Printf.sprintf "\"%s\"]\n" (Number.text e.top)) in
+  List.iter (fun s -> feed ("[" ^ line_text s ^ "]\n")) (List.sort compare (Array.to_list nodes.labels));
+  List.iteri (fun k (paired, edges, _) ->
+    if k > 0 then feed "{}\n";
+    if paired && not (List.for_all known edges) then feed "{\"undirected\": true}\n";
+    List.iter line (List.sort (fun a b -> compare (name a.tail, name a.head, sign a) (name b.tail, name b.head, sign b)) edges)) modes;
+  Sha256.finish sum
 
-let protocol v =
-  let number_of get k = number ("protocol." ^ k) (get k) in
-  match v with
-  | Obj l when List.assoc_opt "kind" l = Some (Str "sliding-mode") ->
-      let get = fields "protocol" [ "kind"; "T_r"; "T_s"; "rho1"; "rho2"; "kappa"; "mu1"; "mu2"; "mu3"; "delta"; "disturbance" ] v in
-      let q = number_of get in
-      (match get "disturbance" with Null | Str _ -> () | _ -> bad "protocol.disturbance is not a text");
-      SlidingMode (q "T_r", q "T_s", q "mu1", q "mu2", q "mu3", q "delta"), q "rho1", q "rho2", q "kappa"
-  | _ ->
-      let get = fields "protocol" [ "kind"; "T"; "rho1"; "rho2"; "kappa" ] v in
-      need (get "kind" = Str "nominal") "an unknown kind of protocol";
-      let q = number_of get in
-      Nominal (q "T"), q "rho1", q "rho2", q "kappa"
+let gain v =
+  let alike = [ "kind"; "rho1"; "rho2"; "kappa" ] in
+  let all get kind = let q k = number ("gain." ^ k) (get k) in kind q, q "rho1", q "rho2", q "kappa" in
+  if part "kind" v = Some (Str "sliding-mode") then begin
+    let get = fields "gain" ~may:[ "disturbance" ] (alike @ [ "T_r"; "T_s"; "mu1"; "mu2"; "mu3"; "delta" ]) v in
+    need (match get "disturbance" with Null | Str _ -> true | _ -> false) "gain.disturbance is not a text";
+    all get (fun q -> SlidingMode (q "T_r", q "T_s", q "mu1", q "mu2", q "mu3", q "delta")) end
+  else begin
+    let get = fields "gain" (alike @ [ "T" ]) v in
+    need (get "kind" = Str "nominal") "an unknown kind of gain";
+    all get (fun q -> Nominal (q "T")) end
+(* nodes, modes, the SHA-256 of both, the gain, and where agents and sliding variables begin *)
+let problem family v =
+  let due = [ "graph"; "gain" ] @ if family then [ "signal" ] else [] in
+  let get = fields "problem" ~may:[ "initial_state"; "sliding_variable" ] due v in
+  if family then need (get "signal" = Str "any") "problem.signal: any signal is meant";
+  let graph = fields "graph" ([ "nodes"; "modes"; "sha256" ] @ if family then [] else [ "read" ]) (get "graph") in
+  if not family then how_read (graph "read");
+  let nodes = nodes_of (graph "nodes") and listed = entries "modes" (graph "modes") in
+  let count = List.length listed in
+  need (count = 1 || family && count > 0 && count <= most_modes) "graph.modes: one of a fixed graph, 1 to 1,000 of a family";
+  let modes = map (mode_of family nodes) listed in
+  let sha256 = hash nodes modes in
+  need (graph "sha256" = Str sha256) "graph: another SHA-256 than that of the modes";
+  let (kind, _, _, _) as gain = gain (get "gain") in
+  need ((match kind with SlidingMode _ -> true | Nominal _ -> false) = (get "sliding_variable" <> Null))
+    "sigma(0) belongs to the sliding-mode protocol, and is part of it";
+  nodes, modes, sha256, gain, optional (state nodes) "initial_state" (get "initial_state"),
+  Option.value (optional (state nodes) "sliding_variable" (get "sliding_variable")) ~default:[]
 
 let interval what = function
   | Obj l when List.mem_assoc "mid" l ->
@@ -124,7 +183,8 @@ let large_components nodes listed vectors =
   List.concat (List.mapi (fun k (own, _, _) ->
     match List.assoc_opt own vectors with Some eta -> [ stated k own eta ] | None -> []) listed)
 (* closed components as they are listed, and the followers *)
-let listed_components nodes structure =
+let listed_components nodes v =
+  let structure = fields "structure" [ "connectivity"; "closed_components"; "leaders"; "followers"; "balanced"; "sign_symmetric" ] v in
   let n = Array.length nodes.labels in
   let listed = List.map (fun item ->
     let get = match item with
@@ -141,14 +201,13 @@ let listed_components nodes structure =
   let followers = List.filter (fun i -> not is_leader.(i)) (List.init n Fun.id) in
   need (positions nodes "leaders" (structure "leaders") = leading) "other leaders";
   need (positions nodes "followers" (structure "followers") = followers) "other followers";
-  listed, followers
+  structure, listed, followers
 (* closed components with their witnesses, and what influence says of the balanced ones *)
-let components nodes structure influence =
+let components nodes listed followers influence =
   let n = Array.length nodes.labels in
-  let get = fields "influence" [ "components"; "containment_weights"; "degenerate" ] influence in
-  let listed, followers = listed_components nodes structure in
+  let get = fields "influence" ~may:[ "containment_weights"; "degenerate" ] [ "components" ] influence in
   if get "containment_weights" = Null then
-    let comps, lefts = large_components nodes listed (get "components") in comps, lefts, followers, get "degenerate", true
+    let comps, lefts = large_components nodes listed (get "components") in comps, lefts, get "degenerate", true
   else
   let () = Number.few_rows "containment_weights, in a certificate" n in
   let balanced = List.length (List.filter (fun (_, b, _) -> b) listed) in
@@ -174,7 +233,7 @@ let components nodes structure influence =
       { nodes = own; camps = Gauge (Array.to_list g); share = Array.to_list w; null = Array.to_list v } end
     else
       { nodes = own; share = []; null = []; camps = cycle_of nodes (get "negative_cycle") }) listed in
-  comps, [], followers, get "degenerate", false
+  comps, [], get "degenerate", false
 
 (* a Lyapunov matrix on all nodes, 0 elsewhere; the weights of a diagonal one *)
 let matrix nodes what own rows =
@@ -237,8 +296,8 @@ let dominance nodes comps facts edges_in proof of_ rate v =
   need (!rest = []) "groups: one for each leader group";
   List.map (fun i -> i, weights.(i)) own, Array.to_list weights, (Array.to_list vector, alone)
 let function_ nodes listening comps vectors facts edges_in proof gauge paper number_of v =
-  let of_ = Printf.sprintf "lyapunov.functions[%d]" number_of in
-  let get = fields "a Lyapunov function" [ "class"; "coordinates"; "blocks"; "rho"; "rate"; "overshoot"; "deviation" ] v in
+  let of_ = Printf.sprintf "decays[%d]" number_of in
+  let get = fields "a Lyapunov function" ~may:[ "rho"; "deviation" ] [ "class"; "coordinates"; "blocks"; "rate"; "overshoot" ] v in
   let rate = number "rate" (get "rate") and overshoot = number "overshoot" (get "overshoot") in
   let ly, diagonal, lowest, highest = match paper with
     | Some (p : Paper.t) when p.own_rate <> None && number_of = 0 ->
@@ -290,15 +349,20 @@ let function_ nodes listening comps vectors facts edges_in proof gauge paper num
 
 (* reaching times that the panels of the check can place; of many agents, of instants near 0 or far away none *)
 let most_instants = 100
-let reaching_times proof kind kappa sliding z not_checked =
+let reaching_times nodes proof kind kappa sliding v not_checked = match kind with
+| Nominal _ -> need (v = Null) "reaching times without sliding variables"; []
+| SlidingMode (t_r, _, _, mu2, mu3, _) ->
+  let get = fields "reaching_time" [ "bound"; "clock"; "z" ] v in
+  need (get "bound" = Str Texts.sliding_bound && get "clock" = Str Texts.sliding_clock) "reaching_time: another bound or clock";
+  bare_of proof "sliding-bound" "gain";
+  let z = by_agent nodes (optional number) "reaching_time.z" (get "z") in
   let both = List.combine sliding z in
   let at_0 s = Number.equal s Number.zero in
   List.iter (function
     | s, Some z -> need (Number.compare z Number.zero >= 0 && at_0 s = at_0 z) "reaching_time.z: not of such a variable"
     | _, None -> ()) both;
   let moving = List.filter_map (fun (s, z) -> if at_0 s then None else z) both in
-  let push = match kind with
-    | SlidingMode (t_r, _, _, mu2, mu3, _) -> Number.add (Number.mul t_r mu2) (Number.mul mu3 kappa) | Nominal _ -> Number.zero in
+  let push = Number.add (Number.mul t_r mu2) (Number.mul mu3 kappa) in
   let whole k = Number.of_z (Z.of_int k) in
   let near z = Number.compare z (whole 25) <= 0 && Number.compare (Number.mul z (whole (1 lsl 30))) Number.one >= 0 in
   if moving = [] then z
@@ -348,55 +412,34 @@ let edges_into nodes comps edges =
   fun number -> into.(number)
 
 let certificate (j : Json.t) : t =
-  (match j with
-   | Obj l when List.assoc_opt "schema" l = Some (Str "ptcc-certificate/2") ->
-       List.iter (fun (key, what) -> if List.mem_assoc key l then unsupported what) not_read;
-       (match List.assoc_opt "graph" l with
-        | Some (Obj g) when List.mem_assoc "modes" g -> unsupported "a certificate of a family" | _ -> ())
-   | _ -> bad "not a certificate of schema \"ptcc-certificate/2\"");
-  let more = List.filter (fun (key, _) -> match j with Obj l -> List.mem_assoc key l | _ -> false) besides in
-  let apart = match j with Obj l -> List.mem_assoc "components" l | _ -> false in
-  let of_agents = match j with Obj l -> List.mem_assoc "agents" l | _ -> false in
+  if part "formation" j <> None then unsupported "single integrators in a formation";
+  let of_agents = part "agents" j <> None in
   let also = [ ("phases", "faster decrease nearer to the deadline"); ("instants", "Lyapunov functions on the way") ] in
-  let also = List.filter (fun (key, _) -> of_agents && (match j with Obj l -> List.mem_assoc key l | _ -> false)) also in
-  let get = fields "the certificate" (keys @ List.map fst more @ (if apart then [ "components" ] else [])
-    @ (if of_agents then [ "agents" ] else []) @ List.map fst also) j in
+  let may = [ "claim"; "components"; "paper"; "overshoot"; "influence"; "final_state"; "reaching_time"; "input"; "messages"; "agents" ] in
+  let get = opened ~may:(may @ if of_agents then List.map fst also else []) [ "rates" ] j in
   let left_out = ref [] in
   let not_checked s = left_out := s :: !left_out in
-  List.iter (fun (key, what) -> not_checked (Printf.sprintf "%s, all that is said of %s" key what)) more;
-  List.iter (fun (key, what) -> not_checked (Printf.sprintf "%s, all that is said of %s" key what)) also;
-  ignore (text "producer" (get "producer"));
-  ignore (match get "unverified" with Obj _ -> () | _ -> bad "unverified is not an object");
-  let outside = match j with Obj l -> List.filter (fun (k, _) -> k <> "digest" && k <> "unverified") l | _ -> [] in
-  need (get "digest" = Str (hashed (Obj outside))) "digest: the certificate was changed after it was made";
-  let nodes, edges, sha256 = graph (get "graph") in
-  let structure = fields "structure"
-    [ "connectivity"; "closed_components"; "leaders"; "followers"; "balanced"; "sign_symmetric" ] (get "structure") in
-  let kind, rho1, rho2, kappa = protocol (get "protocol") in
+  let of_messages = set_apart get not_checked [ messages ] in
+  ignore (set_apart get not_checked also : bool);
+  let nodes, modes, sha256, (kind, rho1, rho2, kappa), start, sliding = problem false (get "problem") in
+  let edges = List.concat_map (fun (_, edges, _) -> map (fun e -> { tgt = e.head; src = e.tail; wt = e.top }) edges) modes in
   let is_sliding = match kind with SlidingMode _ -> true | Nominal _ -> false in
   let proof = proof_of (get "proof") in
-  bare_of proof "structure" "graph";
+  bare_of proof "structure" "graph.modes[0]";
   bare_of proof "claim" "graph";
   if get "influence" = Null then unsupported "an undecided certificate, without influence";
-  let comps, lefts, followers, degenerate, enclosed = components nodes structure (get "influence") in
+  let structure, listed, followers = match entries "structure" (get "structure") with
+    | [ v ] -> listed_components nodes v | _ -> bad "structure: one of a fixed graph" in
+  let comps, lefts, degenerate, enclosed = components nodes listed followers (get "influence") in
   let n = Array.length nodes.labels in
   if not enclosed then begin
     Number.limited "edges" ~entries:(n * n) (List.map (fun e -> e.wt) edges);
     List.iter (fun get -> Number.limited "influence" ~entries:(n * List.length comps) (List.concat_map get comps))
       [ (fun (one : comp) -> one.share); (fun one -> one.null) ] end;
-  let all = Pieces.graph n edges in
-  let found = Pieces.find all in
-  let pieces = List.map (Pieces.piece all comps) found.pieces in
-  let final_beside = match get "final_state" with
-    | Obj l -> (match List.assoc_opt "mid" l with Some m -> beside m | None -> false) | _ -> false in
+  let all, all_balanced, pieces = Pieces.whole n edges comps structure in
+  let final_beside = Option.fold ~none:false ~some:beside (part "mid" (get "final_state")) in
   let final_text = match get "final_state" with Obj l when not final_beside && List.length l = Array.length nodes.labels -> Obj l | _ -> Null in
-  let theorem = Pieces.compare_claims nodes is_sliding pieces (structure "connectivity") (get "claim")
-    (match j with Obj l -> List.assoc_opt "components" l | _ -> None) final_text in
-  need (structure "balanced" = Bool (match found.balance with Gauge _ -> true | Cycle _ -> false)) "structure: balance of the graph";
-  need (structure "sign_symmetric" = Bool (Pieces.sign_symmetric all)) "structure: sign symmetry";
-  let start = match get "initial_state" with Null -> None | v -> Some (state nodes "initial_state" v) in
-  let sliding = match get "sliding_variable" with Null -> [] | v -> state nodes "sliding_variable" v in
-  need (is_sliding = (get "sliding_variable" <> Null)) "sigma(0) belongs to the sliding-mode protocol, and is part of it";
+  let theorem = Pieces.compare_claims nodes is_sliding pieces (get "claim") (get "components") final_text in
   let final = match start, get "final_state" with
     | None, Null -> []
     | Some _, v when final_beside ->
@@ -409,7 +452,7 @@ let certificate (j : Json.t) : t =
   Number.limited "the final state" (List.concat_map (fun (x, r) -> [ x; r ]) final);
   let degenerate = match start, degenerate with
     | None, v -> need (v = Null) "influence.degenerate without an initial state"; None
-    | Some _, _ when enclosed -> not_checked "influence.degenerate"; None
+    | Some _, v when enclosed -> ignore (entries "degenerate" v); not_checked "influence.degenerate"; None
     | Some _, v ->
         let numbers = List.map (fun v -> let z = integer "degenerate" v in
           need (Z.sign z > 0 && Z.leq z (Z.of_int (List.length comps))) "degenerate: no closed component has this number";
@@ -423,8 +466,7 @@ let certificate (j : Json.t) : t =
       | _, Null -> [], final
       | _ when not enclosed -> unsupported "a final state that is enclosed by a witness"
       | _, w -> state nodes "the witness u" ((fields "the witness" [ "u" ] w) "u"), final in
-  if enclosed && entries "influence.components" ((fields "influence" [ "components"; "containment_weights"; "degenerate" ]
-    (get "influence")) "components") <> [] then not_checked "influence.components";
+  if lefts <> [] then not_checked "influence.components";
   let closed = List.mapi (fun k (one : Checker.comp) -> k + 1, one.nodes, is_balanced one) comps in
   let setting = { Paper.n = Array.length nodes.labels; edges; closed; followers; theorem } in
   let paper = optional (fun _ v -> Paper.read setting nodes proof v) "paper" (get "paper") in
@@ -433,14 +475,14 @@ let certificate (j : Json.t) : t =
   let is_target = Array.make (Array.length nodes.labels) false in
   List.iter (fun e -> is_target.(e.tgt) <- true) edges;
   let listening = List.filter (fun i -> is_target.(i)) (List.init (Array.length nodes.labels) Fun.id) in
-  let listed = entries "functions" ((fields "lyapunov" [ "functions" ] (get "lyapunov")) "functions") in
+  let listed = entries "decays" (get "decays") in
   let vectors = ref [] and facts = ref [] in
   let functions = List.mapi (function_ nodes listening comps vectors facts (edges_into nodes comps edges) proof gauge paper) listed in
   let is_weighted f = match f.ly with Weighted _ -> true | _ -> false in
   let own_rate = Option.bind paper (fun (p : Paper.t) -> p.own_rate) in
   if enclosed && not (own_rate = None && List.for_all is_weighted functions) then unsupported "a large form with dense matrices";
   if not enclosed && List.exists is_weighted functions then unsupported "dominance with weights of followers";
-  let rates = fields "rates" [ "paper"; "diagonal"; "proved"; "upper_bound" ] (get "rates") in
+  let rates = fields "rates" ~may:[ "paper"; "diagonal"; "proved"; "upper_bound" ] [] (get "rates") in
   let rate k = optional number ("rates." ^ k) (rates k) in
   (match rate "paper", own_rate with
    | None, None -> () | Some a, Some b when Number.equal a b -> () | _ -> bad "rates.paper is not that of the paper's function");
@@ -461,20 +503,16 @@ let certificate (j : Json.t) : t =
     | Some _ ->
         skipped proof (if following proof = "rate-mean" then "rate-mean" else "rate-upper-bound") "rates";
         not_checked "rates.upper_bound, input.threshold.upper"; None in
-  let reaching = if is_sliding then begin
-    let times = fields "reaching_time" [ "bound"; "clock"; "z" ] (get "reaching_time") in
-    need (times "bound" = Str Texts.sliding_bound && times "clock" = Str Texts.sliding_clock) "reaching_time: another bound or clock";
-    bare_of proof "sliding-bound" "protocol";
-    reaching_times proof kind kappa sliding (by_agent nodes (optional number) "reaching_time.z" (times "z")) not_checked end
-  else (need (get "reaching_time" = Null) "reaching times without sliding variables"; []) in
+  let reaching = reaching_times nodes proof kind kappa sliding (get "reaching_time") not_checked in
+  let full k = part "class" (List.nth listed k) = Some (Str "full") in
   let bounded_input, sliding_input, functions, efforts, start_box = match get "input" with
     | Null ->
-        need (of_agents || rate "proved" = None && edges <> []) "input is null, though a decay was proved, or nothing moves";
+        need (of_agents || rate "proved" = None && edges <> []) "there is no input, though a decay was proved, or nothing moves";
         false, [], functions, [], None
     | v ->
-        let input = fields "input" [ "bounded"; "threshold"; "initial_set"; "constants"; "peak"; "energy"; "path_length";
-          "sliding"; "residual"; "disturbed" ] v in
-        let threshold = fields "threshold" [ "lower"; "upper" ] (input "threshold") in
+        let input = fields "input" ~may:[ "bounded"; "initial_set"; "peak"; "energy"; "path_length"; "sliding"; "disturbed" ]
+          [ "threshold"; "constants"; "residual" ] v in
+        let threshold = fields "threshold" ~may:[ "lower"; "upper" ] [] (input "threshold") in
         List.iter (fun (key, of_) ->
           let half = Number.div (Number.mul rho2 kappa) (Number.of_z (Z.of_int 2)) in
           match optional number "threshold" (threshold key), rate of_ with
@@ -485,29 +523,26 @@ let certificate (j : Json.t) : t =
           | Null -> false
           | b when following proof = "input-threshold" ->
               let stays = truth "input.bounded" b in
-              (match proof.rest with
-               | Obj l :: _ when stays && List.assoc_opt "witness" l = Some (Str "rate") ->
-                   ignore (proved proof "input-threshold" "input" []); true
-               | _ -> skipped proof "input-threshold" "input"; not_checked "input.bounded"; false)
+              if stays && following_witness proof = Str "rate" then (ignore (proved proof "input-threshold" "input" []); true)
+              else (skipped proof "input-threshold" "input"; not_checked "input.bounded"; false)
           | _ -> bad "input.bounded without a proof" in
         let constants = entries "constants" (input "constants") in
         need (List.length constants = List.length functions) "constants: one for each Lyapunov function";
-        let is_full = function Obj l -> List.assoc_opt "class" l = Some (Str "full") | _ -> false in
         let functions = List.mapi (fun k (f, v) -> match v with
           | Null -> f
           | v ->
-              need (is_full (List.nth listed k)) "constants: of a Lyapunov function that is not full";
-              bare_of proof "input-constants" (Printf.sprintf "lyapunov.functions[%d]" k);
+              need (full k) "constants: of a Lyapunov function that is not full";
+              bare_of proof "input-constants" (Printf.sprintf "decays[%d]" k);
               { f with constants = Some (by_agent nodes number "constants" v) }) (List.combine functions constants) in
         let there v = v <> Null in
         let sliding_input = match input "sliding", kind with
           | Null, Nominal _ -> []
           | v, SlidingMode (_, _, _, _, mu3, _) ->
-              let part = fields "input.sliding" [ "bounded"; "agents" ] v in
-              need (truth "input.sliding.bounded" (part "bounded") = (Number.compare (Number.mul mu3 kappa) (Number.of_z Z.one) >= 0))
+              let told = fields "input.sliding" ~may:[ "agents" ] [ "bounded" ] v in
+              need (truth "input.sliding.bounded" (told "bounded") = (Number.compare (Number.mul mu3 kappa) (Number.of_z Z.one) >= 0))
                 "input.sliding: bounded for every initial state iff mu3 kappa >= 1";
-              if not (there (part "agents")) then []
-              else (bare_of proof "input-sliding" "input"; by_agent nodes number "input.sliding.agents" (part "agents"))
+              if not (there (told "agents")) then []
+              else (bare_of proof "input-sliding" "input"; by_agent nodes number "input.sliding.agents" (told "agents"))
           | _ -> bad "input.sliding of the nominal protocol" in
         let start_box = match input "initial_set" with
           | Obj l as v when List.mem_assoc "radius" l ->
@@ -537,20 +572,15 @@ let certificate (j : Json.t) : t =
           @ List.filter (fun key -> there (input key)) [ "disturbed" ] in
         List.iter (fun key -> not_checked ("input." ^ key)) left;
         bounded, sliding_input, functions, efforts, (if efforts = [] then None else start_box) in
-  let and_besides o = match o with
-    | Obj l -> (match List.assoc_opt "kind" l, List.assoc_opt "of" l with
-        | Some (Str k), Some (Str o) when more <> [] && of_besides k && named k && named o -> unknown proof k o
-        | _ -> bad "an obligation that nothing asks for")
-    | _ -> bad "an obligation is not an object" in
   (* of agents of order n: [Agents] reads them *)
-  while not of_agents && proof.rest <> [] do and_besides (List.hd proof.rest) done;
+  if not of_agents then others proof (fun kind -> of_messages && String.starts_with ~prefix:"late-" kind);
   let verdict = text "verdict" (get "verdict") in
   let certified = if of_agents then verdict = "certified" else rate "proved" <> None || edges = [] in
   need (verdict = (if certified then "certified" else "undecided")) "what was proved makes another verdict";
   if not certified then unsupported "an undecided certificate";
-  { nodes; rest = proof.rest; hints = { vectors = List.rev !vectors; facts = !facts; lefts; around }; sha256; theorem; checked = List.rev proof.checked; unchecked = List.rev proof.unchecked;
+  { nodes; rest = proof.rest; full; hints = { vectors = List.rev !vectors; facts = !facts; lefts; around }; sha256; theorem; checked = List.rev proof.checked; unchecked = List.rev proof.unchecked;
     sections = List.rev !left_out;
-    cert = { order = Array.length nodes.labels; edges; kind; rho1; rho2; kappa; comps; pieces; all_balanced = found.balance;
+    cert = { order = Array.length nodes.labels; edges; kind; rho1; rho2; kappa; comps; pieces; all_balanced;
       sign_symmetric = Pieces.sign_symmetric all; funcs = functions;
       start = Option.value start ~default:[]; sliding; final; enclosed; reaching; sliding_input; efforts;
       margins = (match paper with Some p -> p.inequalities | None -> []);

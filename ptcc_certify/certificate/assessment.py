@@ -56,7 +56,7 @@ def rejection(report: CheckReport) -> dict[str, Any]:
 
     Examples
     --------
-    >>> rejection(check({"schema": "ptcc-certificate/2"}))["verdict"]
+    >>> rejection(check({"schema": "ptcc-certificate/3"}))["verdict"]
     'undecided'
     """
     return {"verdict": "undecided", "rejected": report.rejected, "reason": report.reason}

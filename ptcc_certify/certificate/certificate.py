@@ -130,7 +130,7 @@ def read_certificate(
     Parameters
     ----------
     path : str, Path, mapping or Certificate
-        A file of schema ``ptcc-certificate/2``; its side files are in the same folder. ``"-"`` is standard input, with
+        A file of schema ``ptcc-certificate/3``; its side files are in the same folder. ``"-"`` is standard input, with
         side files in the current folder. Or its parsed JSON, without side files; or a certificate, which is written
         down and read back.
     stdlib : bool

@@ -110,7 +110,7 @@ class Recorded(Evidence):
         return {**document, "verdict": self.verdict}
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the certificate as JSON-ready data of schema ``ptcc-certificate/2``, without side files: a copy.
+        """Return the certificate as JSON-ready data of schema ``ptcc-certificate/3``, without side files: a copy.
 
         One that was read is what its file says. Of one that the independent check rejects, a defect of this program,
         it tells the verdict, what is rejected and why, and no claim.

@@ -57,7 +57,7 @@ def check(
 
     Examples
     --------
-    >>> check({"schema": "ptcc-certificate/2"}).reason
+    >>> check({"schema": "ptcc-certificate/3"}).reason
     'the key "producer" is missing'
     """
     return read_and_check(source, stdlib=stdlib, files=files, memory=memory)[1]
@@ -73,8 +73,8 @@ def read_and_check(source: Any, **options: Any) -> tuple[dict[str, Any], CheckRe
 
     Examples
     --------
-    >>> read_and_check({"schema": "ptcc-certificate/2"})[0]
-    {'schema': 'ptcc-certificate/2'}
+    >>> read_and_check({"schema": "ptcc-certificate/3"})[0]
+    {'schema': 'ptcc-certificate/3'}
     """
     options["memory"] = number_within(options.get("memory", 1), "memory in GB", 1e-9, 1e8)
     if hasattr(source, "for_check"):

@@ -1,4 +1,4 @@
-"""The JSON of a certificate, schema ``ptcc-certificate/2``, written from sections."""
+"""The JSON of a certificate, schema ``ptcc-certificate/3``, written from sections."""
 
 from __future__ import annotations
 
@@ -31,14 +31,15 @@ from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.certificate.graph_sections import (
     claim_sections,
     claim_witnesses,
-    family_sections,
+    family_claim_sections,
+    family_section,
     graph_section,
     structure_section,
 )
 from ptcc_certify.certificate.proof import Proof
 from ptcc_certify.certificate.section_io import Writer, write
 from ptcc_certify.certificate.unverified_section import write_unverified
-from ptcc_certify.checker import NOT_OF_FAMILIES, SCHEMA, SLIDING_BOUND, SLIDING_CLOCK
+from ptcc_certify.checker import SCHEMA, SLIDING_BOUND, SLIDING_CLOCK
 from ptcc_certify.checker.agent_decrease import PhaseSection
 from ptcc_certify.checker.agent_instants import InstantsSection
 from ptcc_certify.checker.common_kernel_ends import EQUAL
@@ -49,7 +50,7 @@ from ptcc_certify.checker.lyapunov import OvershootSection, RatesSection
 from ptcc_certify.checker.messages import MessagesSection
 from ptcc_certify.checker.obligations import CheckReport
 from ptcc_certify.checker.protocol import ReachingTimes, SlidingPart
-from ptcc_certify.checker.row_functions import FamilyFunctionsSection
+from ptcc_certify.checker.row_functions import FunctionOfFamily
 from ptcc_certify.checker.section_declarations import Ball, ByAgent, Several
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.signal_bounds import FamilyInput
@@ -76,6 +77,7 @@ def certificate_document(
         run = certificate.trajectory
         met = None if run is None or run.sliding is None else run.sliding.source
         sections, more, steps = *_graph_sections(proof, met, out), iter(proof.witnesses)
+    sections = {key: part for key, part in sections.items() if part is not None}
     document: dict[str, Any] = {"schema": SCHEMA, "producer": producer(), **sections, "proof": [], "verdict": ""}
     document |= {**more, **_sections_beside(proof, out), "digest": "", "unverified": write_unverified(certificate)}
     given = {(o.kind, o.of): write_obligation(o, out) for o in steps}
@@ -83,27 +85,29 @@ def certificate_document(
     return document, out.files, report
 
 
-def _begin_sections(proof: Proof, out: Writer) -> dict[str, Any]:
-    """Return where the agents begin."""
-    return {
+def _problem(proof: Proof, graph: Mapping[str, Any], met: str | None, out: Writer) -> dict[str, Any]:
+    """Return what is asked: graph, gain, where the agents begin."""
+    parts = {
+        "graph": graph,
+        "signal": "any" if isinstance(proof, FamilyProof) else None,
+        "gain": gain_section(proof.protocol, met),
         "initial_state": out.state("start", proof.initial_state),
         "sliding_variable": out.state("sigma", proof.sigma0),
     }
+    return {key: part for key, part in parts.items() if part is not None}
 
 
 def _graph_sections(proof: GraphProof, met: str | None, out: Writer) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return what files say of one graph, before the proof and behind it; its run has ``met`` a disturbance."""
     influence, final = final_state_sections(proof, out)
     sections = {
-        "graph": graph_section(proof.graph, out),
-        "structure": structure_section(proof.structure, out),
+        "problem": _problem(proof, graph_section(proof.graph, out), met, out),
+        "structure": [structure_section(proof.structure, out)],
         **claim_sections(proof.structure, proof.claims, final, out),
-        "protocol": protocol_section(proof.protocol, met),
         "paper": write(PaperSection, paper_section(proof), Writer(proof.labels)),
-        "lyapunov": {"functions": [_write_function(V, out) for V in proof.functions]},
+        "decays": [_write_function(V, out) for V in proof.functions],
         "rates": write(RatesSection, _rates(proof), out),
         "overshoot": write(OvershootSection, _overshoot(proof), out),
-        **_begin_sections(proof, out),
         "influence": write(InfluenceSection, influence, out),
         "final_state": final,
         "reaching_time": write(ReachingTimes, reaching_section(proof.reaching), out),
@@ -132,11 +136,10 @@ def _family_sections(proof: FamilyProof, out: Writer) -> tuple[dict[str, Any], d
     finals = proof.final_state
     ends = None if finals is None else [None if pair is None else ball(*pair) for pair in finals]
     sections = {
-        **family_sections(proof.family, components, out),
-        "protocol": protocol_section(proof.protocol, None),
-        **dict.fromkeys(NOT_OF_FAMILIES),
-        "lyapunov": write(FamilyFunctionsSection, FamilyFunctionsSection(functions=used, drives=proof.drives), out),
-        **_begin_sections(proof, out),
+        "problem": _problem(proof, family_section(proof.family, out), None, out),
+        **family_claim_sections(proof.family, components, out),
+        "decays": write(Several[FunctionOfFamily], used, out),
+        "drives": write(Several[Fraction], proof.drives, out),
         "reaching_time": write(ReachingTimes, reaching_section(proof.reaching), out),
         "final_state": write(ByAgent[Ball | None], ends, out),
         "input": write(FamilyInput, _input(proof), out),
@@ -167,10 +170,10 @@ def producer() -> str:
     return f"ptcc-certify {version('ptcc-certify')}"
 
 
-def protocol_section(protocol: Protocol, disturbance: str | None) -> dict[str, Any]:
+def gain_section(protocol: Protocol, disturbance: str | None) -> dict[str, Any]:
     """Return a protocol as files have it; ``disturbance`` is what a run of the sliding-mode protocol met, if any."""
     section: dict[str, Any] = protocol.to_dict()
-    return section if protocol.reaching is None else {**section, "disturbance": disturbance}
+    return section if disturbance is None else {**section, "disturbance": disturbance}
 
 
 def reaching_section(reaching: Sequence[ReachingTime] | None) -> ReachingTimes | None:
@@ -220,7 +223,7 @@ def _steps(proof: FamilyProof, out: Writer) -> Iterator[Obligation]:
     functions = [V for part in proof.parts for V in part.functions]
     yield Obligation("family-claim", "graph", witness=claim_witnesses(proof.family, components))
     for k, V in enumerate(functions):
-        yield from function_steps(f"lyapunov.functions[{k}]", V, out)
+        yield from function_steps(f"decays[{k}]", V, out)
     if proof.final_state is not None:
         yield Obligation("family-final-state", "final_state", witness=_means(proof))
     for k, claim in enumerate(proof.restricted):

@@ -240,7 +240,7 @@ class Evidence(OfQuestion, Shown):
         run = self.trajectory
         source = None if run is None or run.sliding is None else run.sliding.source
         if self.proof.source is not None:
-            source = self.proof.source.document["protocol"]["disturbance"]
+            source = self.proof.source.document["problem"]["gain"].get("disturbance")
         if source is None or source == "none":
             return source or WORST_CASE
         try:

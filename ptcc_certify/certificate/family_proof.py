@@ -284,18 +284,12 @@ class FamilyProof(Proof):
         """``c`` of every function, part after part: how much sliding variables drive it; None if none moves."""
         if self.direct:
             return None
-        pairs = zip(self.bound_functions, self._drives, strict=True)
-        return tuple(own.constant(V) for functions, own in pairs if own is not None for V in functions)
+        return tuple(own.constant(V) for part, own in self._driven_parts if own is not None for V in part.functions)
 
     @property
-    def _driven_parts(self) -> Iterator[tuple[ComponentProof, Sequence[ProvedFunction], Drive | None]]:
-        """Of every part its functions, and what sliding variables do to it."""
-        return zip(self.parts, self.bound_functions, self._drives, strict=True)
-
-    @cached_property
-    def bound_functions(self) -> tuple[tuple[ProvedFunction, ...], ...]:
-        """The functions of every part."""
-        return tuple(part.functions for part in self.parts)
+    def _driven_parts(self) -> Iterator[tuple[ComponentProof, Drive | None]]:
+        """Of every part what sliding variables do to it."""
+        return zip(self.parts, self._drives, strict=True)
 
     @cached_property
     def final_state(self) -> FinalEnds | None:
@@ -306,8 +300,8 @@ class FamilyProof(Proof):
         if self.initial_state is None:
             return None
         result: list[Interval | None] = [None] * self.family.n_nodes
-        for part, functions, driven in self._driven_parts:
-            for k, ends in self._final(part, functions, driven).items():
+        for part, driven in self._driven_parts:
+            for k, ends in self._final(part, driven).items():
                 result[int(part.component.nodes[k])] = ends
         return FinalEnds(result, self.family.labels)
 
@@ -321,9 +315,7 @@ class FamilyProof(Proof):
         assert self.nominal_state is not None
         return [self.nominal_state[v] for v in part.component.nodes.tolist()]
 
-    def _final(
-        self, part: ComponentProof, functions: Sequence[ProvedFunction], driven: Drive | None
-    ) -> Mapping[int, Interval | None]:
+    def _final(self, part: ComponentProof, driven: Drive | None) -> Mapping[int, Interval | None]:
         component, x = part.component, self._state(part)
         n = len(x)
         if component.behaviour == STABILITY:
@@ -333,8 +325,8 @@ class FamilyProof(Proof):
         means = {j: c for j, group in enumerate(part.leading_groups) if (c := group.final_value(x)) is not None}
         groups = {j: group.nodes for j, group in enumerate(part.leading_groups)}
         kernel = part.kernel_rows
-        near, wide = ends_near(kernel, groups, functions, x, driven)
-        return dict(limits(kernel, groups, means, near, deviations(functions, x, driven), x, wide))
+        near, wide = ends_near(kernel, groups, part.functions, x, driven)
+        return dict(limits(kernel, groups, means, near, deviations(part.functions, x, driven), x, wide))
 
     @property
     def bounded(self) -> bool | None:
@@ -366,9 +358,9 @@ class FamilyProof(Proof):
             return None
         result = [Fraction(0)] * self.family.n_nodes
         gains = self.protocol.parameters
-        for part, functions, driven in self._driven_parts:
+        for part, driven in self._driven_parts:
             nodes = part.component.nodes.tolist()
-            bounds, unit = peaks(functions, gains, self._state(part), driven)
+            bounds, unit = peaks(part.functions, gains, self._state(part), driven)
             for k, bound in bounds.items():
                 result[nodes[k]] = Fraction(bound, unit)
         return tuple(result)
@@ -442,12 +434,10 @@ class FamilyProof(Proof):
         """The bounds over time of every component."""
         return tuple(self._bounds_of(*one) for one in self._driven_parts)
 
-    def _bounds_of(
-        self, part: ComponentProof, functions: Sequence[ProvedFunction], driven: Drive | None
-    ) -> ComponentBounds:
+    def _bounds_of(self, part: ComponentProof, driven: Drive | None) -> ComponentBounds:
         """Return the bounds of a component; where nothing drives it by functions of parts that others follow, too."""
         everybody = np.arange(part.component.nodes.size)
-        own = [FunctionOf(everybody, V, part.rest_states) for V in functions]
+        own = [FunctionOf(everybody, V, part.rest_states) for V in part.functions]
         if driven is not None:
             return ComponentBounds(own, self._state(part), drive=driven, phase=self._phase)
         rows = HeardRows.of(part.component.family)
@@ -456,7 +446,7 @@ class FamilyProof(Proof):
         )  # of large families they take long
         ends = [] if finals is None else [finals[v] for v in part.component.nodes.tolist()]
         known = [pair for pair in ends if pair is not None]
-        for led in (led for V in functions if isinstance(V, FollowerFunction) for led in V.parts):
+        for led in (led for V in part.functions if isinstance(V, FollowerFunction) for led in V.parts):
             own.append(FunctionOf(led.agents, led.function, _rest_states(led.function.quotient)))
         return ComponentBounds(own, self._state(part), rows, known if len(known) == everybody.size else None)
 

@@ -153,7 +153,7 @@ class GraphProof(Proof):
         if self.source is None:
             geometry = self._geometry
             functions = tuple(replace(V, deviation=None if geometry is None else geometry.bound(V)) for V in functions)
-        return tuple(replace(V, name=f"lyapunov.functions[{k}]") for k, V in enumerate(functions))
+        return tuple(replace(V, name=f"decays[{k}]") for k, V in enumerate(functions))
 
     @cached_property
     def _geometry(self) -> DeviationGeometry | None:

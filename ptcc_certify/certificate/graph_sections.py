@@ -28,12 +28,13 @@ def structure_document(structure: Structure) -> dict[str, Any]:
     """Return graph, structure and claim as JSON-ready data, in the keys of a certificate."""
     claims = [component.claim for component in structure.components]
     out = Writer(structure.graph.labels)
-    data = {"graph": graph_section(structure.graph, out), "structure": structure_section(structure, out)}
+    problem = {"graph": graph_section(structure.graph, out)}
+    data = {"problem": problem, "structure": [structure_section(structure, out)]}
     return data | claim_sections(structure, claims, None, out)
 
 
 def graph_section(graph: SignedDigraph, out: Writer) -> dict[str, Any]:
-    """Return nodes, edges and how they were read."""
+    """Return nodes, the one mode, and how edges were read."""
     read, (table, scale) = graph.read, graph.weight_table()
     edges: Any
     if out.aside(graph.n_edges) and table is not None:
@@ -51,7 +52,7 @@ def graph_section(graph: SignedDigraph, out: Writer) -> dict[str, Any]:
         ]
     return {
         "nodes": list(graph.labels),
-        "edges": edges,
+        "modes": [{"edges": edges}],
         "read": {key: read[key] for key in RECORDED if key in read},
         "sha256": graph.sha256,
     }
@@ -78,8 +79,8 @@ def certificate_graph(document: Mapping[str, Any], files: Mapping[str, bytes]) -
     >>> certificate_graph(document, {}) == foes
     True
     """
-    section, side = document["graph"], SideFiles(Path(), files)
-    labels, edges = section["nodes"], section["edges"]
+    section, side = document["problem"]["graph"], SideFiles(Path(), files)
+    labels, edges = section["nodes"], section["modes"][0]["edges"]
     if isinstance(edges, dict):
         source, target, weight = (
             np.array(side.column(edges[key], edges["count"])) for key in ("source", "target", "weight")
@@ -122,7 +123,7 @@ def claim_sections(
     """Return theorem, behaviour and corollaries; of a disconnected graph those of every weak component."""
     if len(claims) == 1:
         return {"claim": _claim(claims[0])}
-    return {"claim": None, "components": _components(structure, claims, final, out)}
+    return {"components": _components(structure, claims, final, out)}
 
 
 def _claim(claim: Claim) -> dict[str, Any]:
@@ -149,27 +150,30 @@ def _components(structure: Structure, claims: Sequence[Claim], final: Mapping[st
             "nodes": [labels[v] for v in c.nodes],
             "connectivity": c.connectivity,
             "claim": _claim(claim),
-            "final_state": final and {labels[v]: final[labels[v]] for v in c.nodes},
+            **({"final_state": {labels[v]: final[labels[v]] for v in c.nodes}} if final else {}),
         }
         for c, claim in zip(components, claims, strict=True)
     ]
 
 
-def family_sections(family: Family, components: Sequence[FamilyComponent], out: Writer | None = None) -> dict[str, Any]:
-    """Return modes, the structure of their mandatory graphs, and the claim of every component."""
-    out, labels = out or Writer(family.labels), family.labels
+def family_claim_sections(family: Family, components: Sequence[FamilyComponent], out: Writer) -> dict[str, Any]:
+    """Return the structure of the mandatory graph of every mode, and the claim of every component."""
+    labels = family.labels
     structures = [structure_section(analyse(mode.mandatory), out) for mode in family.modes]
-    claims = [{"theorem": THEOREM, "behaviour": c.behaviour, "signal": "any"} for c in components]
-    sections: dict[str, Any] = {"graph": _modes(family, out), "structure": {"modes": structures}, "claim": claims[0]}
-    if len(claims) > 1:
-        nodes = [[labels[v] for v in c.nodes.tolist()] for c in components]
-        sections["claim"] = None
-        sections["components"] = [{"nodes": n, "claim": claim} for n, claim in zip(nodes, claims, strict=True)]
-    return sections
+    claims = [{"theorem": THEOREM, "behaviour": c.behaviour} for c in components]
+    if len(claims) == 1:
+        return {"structure": structures, "claim": claims[0]}
+    nodes = [[labels[v] for v in c.nodes.tolist()] for c in components]
+    parts = [{"nodes": n, "claim": claim} for n, claim in zip(nodes, claims, strict=True)]
+    return {"structure": structures, "components": parts}
 
 
-def _modes(family: Family, out: Writer) -> dict[str, Any]:
-    modes = [{"name": mode.name, "undirected": mode.tied, "edges": _edges(mode, out)} for mode in family.modes]
+def family_section(family: Family, out: Writer) -> dict[str, Any]:
+    """Return nodes and modes."""
+    modes = [
+        {"name": mode.name, **({"undirected": True} if mode.tied else {}), "edges": _edges(mode, out)}
+        for mode in family.modes
+    ]
     return {"nodes": list(family.labels), "modes": modes, "sha256": family.sha256}
 
 
@@ -191,9 +195,8 @@ def certificate_family(section: Mapping[str, Any], files: Mapping[str, bytes]) -
 
     Examples
     --------
-    >>> from ptcc_certify.theorems.family_behaviour import decide
     >>> family = Family.from_intervals([("a", "b", -2, -1), ("b", "a", -1, 0)])
-    >>> certificate_family(family_sections(family, decide(family))["graph"], {}) == family
+    >>> certificate_family(family_section(family, Writer(family.labels)), {}) == family
     True
     """
     labels = tuple(section["nodes"])
@@ -208,7 +211,8 @@ def certificate_family(section: Mapping[str, Any], files: Mapping[str, bytes]) -
             source, target = (np.array([index[row[k]] for row in rows], dtype=np.int64) for k in (0, 1))
             ends = [([exact(row[k]) for row in rows], np.arange(len(rows))) for k in (2, -1)]
         sign, lower, upper = _sizes(*ends)
-        modes.append(Mode(labels, source, target, sign, lower, upper, name=mode["name"], tied=mode["undirected"]))
+        tied = "undirected" in mode
+        modes.append(Mode(labels, source, target, sign, lower, upper, name=mode["name"], tied=tied))
     return Family(tuple(modes))
 
 
@@ -269,4 +273,4 @@ def _witness(family: Family, component: FamilyComponent, number: Mapping[int, in
                 state[label] = {"mid": format_exact(middle * q.unit), "radius": format_exact(radius * q.unit)}
             elif middle:
                 state[label] = format_exact(middle * q.unit)
-    return {"mode": why.mode, "other": why.other, "edge": edge, "state": state}
+    return {"mode": why.mode, "other": why.other, **({"edge": edge} if edge else {}), "state": state}

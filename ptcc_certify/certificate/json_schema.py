@@ -41,13 +41,13 @@ def json_schema() -> Schema:
     defs["obligation"] = {
         "anyOf": [_obligation(kind, one, defs) for kind in OBLIGATIONS for one in BRINGS.get(kind, (Brings(),))]
     }
-    modes = {"properties": {"graph": {"type": "object", "required": ["modes"]}}, "required": ["graph"]}
+    signal = {"properties": {"problem": {"type": "object", "required": ["signal"]}}, "required": ["problem"]}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": SCHEMA,
         "title": "Certificate of prescribed-time coordination control on a signed digraph, or on a family of them",
         "description": "What may stand where; FORMAT.md says what must be verified.",
-        **{"if": modes, "then": family, "else": graph},
+        **{"if": signal, "then": family, "else": graph},
         "$defs": defs,
     }
 
@@ -182,10 +182,14 @@ def _obligation(kind: str, brings: Brings, defs: dict[str, Schema]) -> Schema:
         "of": {"type": "string"},
         "proves": {"const": proves},
         "lemma": {"const": lemma},
-        "numbers": _object({name: _ref("number") for name in names}, names),
-        "witness": _schema(brings.witness, defs),
     }
-    return _object(properties, list(properties))
+    if names:
+        properties["numbers"] = _object({name: _ref("number") for name in names}, names)
+    optional = NoneType in get_args(brings.witness)
+    required = [*properties, *(["witness"] if brings.witness is not None and not optional else [])]
+    if brings.witness is not None:
+        properties["witness"] = _schema(_without_null(brings.witness) if optional else brings.witness, defs)
+    return _object(properties, required)
 
 
 if __name__ == "__main__":

@@ -48,10 +48,10 @@ from ptcc_certify.theorems.theorem import ExactInterval, Obligation, RateProof
 def read_document(source: Source) -> tuple[GraphProof | FamilyProof, Observations]:
     """Return what an accepted file proves, and what it says of searches; structures and decisions are made anew."""
     document, sections = source.document, source.report.sections
-    protocol, state = read_protocol(sections["protocol"]), fractions(sections["initial_state"])
+    protocol, state = read_protocol(sections["gain"]), fractions(sections["initial_state"])
     subject: Structure | Family
-    if of_family := "modes" in document["graph"]:
-        subject, effort = certificate_family(document["graph"], source.files), None
+    if of_family := "signal" in document["problem"]:
+        subject, effort = certificate_family(document["problem"]["graph"], source.files), None
     else:
         subject = analyse(certificate_graph(document, source.files))
         effort = with_longest_period(read_effort(source.report, subject, protocol, state), document["unverified"])
@@ -77,8 +77,7 @@ def _read_graph_proof(source: Source, structure: Structure, words: dict[str, Any
     sections, proved = report.sections, report.proved
     paper: PaperSection | None = sections["paper"]
     functions = [
-        _read_function(f"lyapunov.functions[{k}]", section, structure, data, proved)
-        for k, section in enumerate(sections["lyapunov"].functions)
+        _read_function(f"decays[{k}]", section, structure, data, proved) for k, section in enumerate(sections["decays"])
     ]
     lyapunov = next((replace(V, objective=paper.objective) for V in functions if paper and V.kind == "paper"), None)
     rho = None
@@ -105,15 +104,15 @@ def _read_graph_proof(source: Source, structure: Structure, words: dict[str, Any
 def _read_family_proof(source: Source, family: Family, words: dict[str, Any]) -> FamilyProof:
     """Return what is proved of a family; each upper bound on the rate is proved anew from members that are named."""
     document, sections, proved = source.document, source.report.sections, source.report.proved
-    claims = [document["claim"]] if document["claim"] is not None else [c["claim"] for c in document["components"]]
+    claims = [part["claim"] for part in document.get("components", [document])]
     components = [
         component if component.behaviour == claim["behaviour"] else replace(component, behaviour=claim["behaviour"])
         for component, claim in zip(decide(family), claims, strict=True)
     ]
     files = SideFiles(Path(), source.files)
     functions: list[list[ProvedFunction]] = [[] for _ in components]
-    for k, section in enumerate(sections["lyapunov"].functions):
-        V = read_function(f"lyapunov.functions[{k}]", section, components[section.component], proved, files)
+    for k, section in enumerate(sections["decays"]):
+        V = read_function(f"decays[{k}]", section, components[section.component], proved, files)
         functions[section.component].append(V)
     bounds = _read_bounds(document["unverified"].get("upper_bounds"), components)
     restricted = tuple(

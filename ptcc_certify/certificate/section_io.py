@@ -162,7 +162,7 @@ def _side_files(value: Any) -> Iterator[tuple[str, str]]:
 
 
 def text(value: Fraction | None) -> str | None:
-    """Write a rational, or null."""
+    """Write a rational if there is one."""
     return None if value is None else format_exact(value)
 
 

@@ -1,6 +1,6 @@
 """The independent check of a certificate: from its JSON alone, in exact arithmetic, without a solver.
 
-Reads schema ``ptcc-certificate/2``, recomputes the structure of the graph from its edges, and checks every claim
+Reads schema ``ptcc-certificate/3``, recomputes the structure of the graph from its edges, and checks every claim
 outside ``unverified``, obligation by obligation as the proof lists them; ``_verdict`` is the list. ``FORMAT.md``
 specifies the file. Imports the standard library and the kernel :mod:`lmi.exact`, nothing that makes certificates;
 ``TRUSTED`` lists all files that must be right. python-flint and NumPy are used where they are installed.
@@ -49,14 +49,11 @@ from ptcc_certify.checker.row_functions import check_family_functions
 from ptcc_certify.checker.section_declarations import declared
 from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.checker.signal_bounds import check_drive, check_family_bounds
-from ptcc_certify.checker.structure import MANY_COMPONENTS, check_claim, check_structure
+from ptcc_certify.checker.structure import MANY_COMPONENTS, StructureSection, check_claim, check_structure
 from ptcc_certify.checker.theorem_function import check_paper
 
 USAGE = "usage: python -m ptcc_certify.checker CERTIFICATE|- [--stdlib] [--memory GB]"
 GRAPH = "a graph file is not read: compare the SHA-256 that is printed, or use ptcc check CERTIFICATE GRAPH"
-
-#: Parts that are null in a certificate of a family.
-NOT_OF_FAMILIES = tuple(f.key for f in declared(FamilyCertificate) if f.kind is type(None))
 
 #: What values of another type, or too deep, raise where they are used.
 MALFORMED = (ArithmeticError, LookupError, TypeError, ValueError, AttributeError, RecursionError, MemoryError)
@@ -64,7 +61,6 @@ MALFORMED = (ArithmeticError, LookupError, TypeError, ValueError, AttributeError
 __all__ = [
     "INPUT_NODES",
     "MANY_COMPONENTS",
-    "NOT_OF_FAMILIES",
     "OBLIGATIONS",
     "REACHING_BITS",
     "SCHEMA",
@@ -126,7 +122,7 @@ def read_and_check(
     Examples
     --------
     >>> read_and_check({"schema": SCHEMA})[0]
-    {'schema': 'ptcc-certificate/2'}
+    {'schema': 'ptcc-certificate/3'}
     """
     with limited(memory) as account:
         data, folder = (dict(source), Path()) if isinstance(source, Mapping) else (read(source), Path(source).parent)
@@ -190,11 +186,11 @@ def _verdict(doc: Document) -> str:
     RejectedError
         Something does not follow; ``doc.at`` tells where.
     """
-    data, graph_section = doc.data, doc.data.get("graph")
-    of_family = isinstance(graph_section, dict) and "modes" in graph_section
+    problem = doc.data.get("problem")
+    of_family = isinstance(problem, dict) and "signal" in problem
     own, other = (FamilyCertificate, GraphCertificate) if of_family else (GraphCertificate, FamilyCertificate)
     known, foreign = ({f.key for f in declared(kind)} for kind in (own, other))
-    for key in data:
+    for key in doc.data:
         need(key in known or key not in foreign, f"{key} has no place for {'a family' if of_family else 'one graph'}")
     doc.begin(own, BRINGS)
     for key in ("schema", "producer", "unverified", "proof"):
@@ -203,7 +199,9 @@ def _verdict(doc: Document) -> str:
     if of_family:
         return _family_verdict(doc, protocol)
     graph = check_graph(doc)
-    structure = check_structure(doc, graph, doc.section("structure"))
+    sections: Sequence[StructureSection] = doc.section("structure")
+    need(len(sections) == 1, "structure has not one entry")
+    structure = check_structure(doc, graph, sections[0], "graph.modes[0]")
     claim = check_claim(doc, structure, protocol.sliding)
     begin = check_begin(doc, protocol)
     final = check_final_state(doc, structure, claim, begin)
@@ -214,17 +212,18 @@ def _verdict(doc: Document) -> str:
     bound = check_rate_bound(doc, structure)
     check_sliding(doc, graph, protocol, begin)
     verified = Verified(structure, protocol, begin, final, functions, rate, bound)
-    if "agents" in data:
-        need("messages" not in data, "agents of order n with late messages or moving leaders")
+    if "agents" in doc:
+        need("messages" not in doc, "agents of order n with late messages or moving leaders")
         return doc.close(check_agents(doc, verified))
-    need("phases" not in data and "instants" not in data, "phases or instants of agents that are not of order n")
+    need("phases" not in doc and "instants" not in doc, "phases or instants of agents that are not of order n")
     check_input(doc, verified)
     check_messages(doc, verified, protocol, begin)
-    return doc.close(data["influence"] is not None and (rate is not None or not graph.listening))
+    return doc.close("influence" in doc and (rate is not None or not graph.listening))
 
 
 def _family_verdict(doc: Document, protocol: Protocol) -> str:
     """Verify a certificate of a family, part after part; return its verdict."""
+    doc.section("signal")
     family = check_family(doc)
     begin = check_begin(doc, protocol)
     functions = check_family_functions(doc, family)
@@ -233,8 +232,6 @@ def _family_verdict(doc: Document, protocol: Protocol) -> str:
     check_boxes(doc, family, begin)
     check_restricted(doc, family, functions, protocol, begin)
     check_messages(doc, family, protocol, begin)
-    for key in NOT_OF_FAMILIES:
-        doc.section(key)
     return doc.close(True)
 
 

@@ -39,7 +39,7 @@ class Used:
     Attributes
     ----------
     number : int
-        Of ``lyapunov.functions``.
+        Of ``decays``.
     function : Function
     inputs : list of Fraction or None
         ``c_k`` with ``e_k^2 <= c_k E'P E`` of a full matrix; None: not known, or those of a diagonal one.
@@ -62,7 +62,7 @@ class UsedSection:
     """A Lyapunov function that is used, by its number, and constants of a full matrix."""
 
     function: int
-    inputs: FewAgents | None
+    inputs: FewAgents | None = None
 
 
 def verify_used(doc: Document, verified: Verified, entry: UsedSection, before: int) -> Used:

@@ -29,8 +29,8 @@ from ptcc_certify.checker.section_declarations import Ball, ByAgent, Positive, S
 class TrackedSection(UsedSection):
     """A Lyapunov function that is used, and what it is worth at the beginning."""
 
-    initial: Fraction | None
-    drive: Fraction | None
+    initial: Fraction | None = None
+    drive: Fraction | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,10 +41,10 @@ class CascadeSection:
     dimension: int
     functions: Several[TrackedSection]
     offsets: ByAgent[Several[Fraction]]
-    initial_state: ByAgent[Several[Several[Fraction]]] | None
+    initial_state: ByAgent[Several[Several[Fraction]]] | None = None
     motion: Several[Several[Ball]]
-    final_state: ByAgent[Several[Several[Ball]]] | None
-    input: AgentsInput | None
+    final_state: ByAgent[Several[Several[Ball]]] | None = None
+    input: AgentsInput | None = None
 
 
 class Vectors(NamedTuple):
@@ -104,7 +104,7 @@ def check_cascade(doc: Document, verified: Verified) -> bool:
         need(drive is not None, "a bound of the input without initial states")
         if drive is not None:
             _check_input(doc, verified, agents, used, drive, section.input)
-    if "instants" in doc.data:
+    if "instants" in doc:
         need(states is not None, "instants without initial states")
 
         def least(k: int, at: Halved, remaining: Fraction) -> tuple[Fraction, Fraction]:

@@ -60,7 +60,7 @@ class PhaseSection:
 
 def check_phases(doc: Document, agents: Agents, used: Sequence[Used]) -> None:
     """Verify faster decrease of functions that are used, from some ``zeta`` on, by matrices not below the former."""
-    if "phases" not in doc.data:
+    if "phases" not in doc:
         return
     need(agents.cap is None, "phases of a gain that is capped")
     former = {use.number: (agents.W, 1 / agents.first_gain) for use in used}

@@ -128,7 +128,7 @@ class OneAgent:
     coupling: Fraction
     lower_triangle: Triangle
     rate: Fraction
-    gain_cap: Fraction | None
+    gain_cap: Fraction | None = None
     points: Several[Fraction]
 
 

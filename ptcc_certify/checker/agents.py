@@ -34,21 +34,21 @@ class AgentsSection(OneAgent):
 
     functions: Several[UsedSection]
     offsets: ByAgent[Several[Fraction]]
-    initial_state: ByAgent[Several[Several[Fraction]]] | None
+    initial_state: ByAgent[Several[Several[Fraction]]] | None = None
     motion: Several[Several[Ball]]
-    final_state: ByAgent[Several[Several[Ball]]] | None
-    residual: ResidualSection | None
-    input: AgentsInput | None
+    final_state: ByAgent[Several[Several[Ball]]] | None = None
+    residual: ResidualSection | None = None
+    input: AgentsInput | None = None
 
 
 def check_agents(doc: Document, verified: Verified) -> bool:
     """Verify the section ``agents``; return whether agreement and where it happens were proved.
 
-    The initial state of the document is null: that of the agents stands here.
+    The problem tells no initial state: that of the agents stands here.
     """
     _check_document(doc, verified)
     if isinstance(doc.data["agents"], dict) and "cascade" in doc.data["agents"]:
-        need("phases" not in doc.data, "phases of the cascade")
+        need("phases" not in doc, "phases of the cascade")
         return check_cascade(doc, verified)
     section, graph = doc.section("agents"), verified.structure.graph
     agents = agents_of(section, verified.gain)
@@ -66,7 +66,7 @@ def check_agents(doc: Document, verified: Verified) -> bool:
     proved = check_ends(doc, agents, verified.final, section, bool(used))
     _bounds(doc, verified, section, agents, begin, used)
     check_phases(doc, agents, used)
-    if "instants" in doc.data:
+    if "instants" in doc:
         _instants(doc, begin, used)
     return proved
 
@@ -74,9 +74,9 @@ def check_agents(doc: Document, verified: Verified) -> bool:
 def _check_document(doc: Document, verified: Verified) -> None:
     """Verify that the parts that speak of agents of order 1 are empty, and that no sliding variable moves."""
     doc.at = "initial_state"
-    need(doc.data["initial_state"] is None, "an initial state beside that of the agents")
+    need("initial_state" not in doc, "an initial state beside that of the agents")
     doc.at = "input"
-    need(doc.data["input"] is None, "an input beside that of the agents")
+    need("input" not in doc, "an input beside that of the agents")
     doc.at = "sliding_variable"
     need(not any(verified.begin.sigma or ()), "agents of order n begin with sliding variables that are 0")
 

@@ -56,7 +56,7 @@ class KeptBox:
 
 def check_boxes(doc: Document, family: Family, begin: Begin) -> None:
     """Verify every box."""
-    if "boxes" not in doc.data:
+    if "boxes" not in doc:
         return
     items = doc.section("boxes")
     need(bool(items), "no box")

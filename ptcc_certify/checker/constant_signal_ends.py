@@ -37,8 +37,8 @@ class FinalValue:
     lower: Fraction
     upper: Fraction
     within: Fraction
-    above: Some[Fraction] | None
-    below: Some[Fraction] | None
+    above: Some[Fraction] | None = None
+    below: Some[Fraction] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -68,10 +68,10 @@ class RateSection:
     claim: Literal["rate"]
     signals: Dwell | Literal["constant"]
     component: int
-    forms: Several[Triangle] | None
+    forms: Several[Triangle] | None = None
     ratio: Fraction
     rate: Fraction
-    bounded: bool | None
+    bounded: bool | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,7 +82,7 @@ class LastModeSection:
     signals: Dwell | Literal["constant"]
     component: int
     modes: Several[Behaviour | None]
-    final_state: Some[Ball] | None
+    final_state: Some[Ball] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +94,7 @@ class WindowsSection:
     component: int
     behaviour: Behaviour
     eta: Positive
-    final_state: Some[Ball] | None
+    final_state: Some[Ball] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,7 +107,7 @@ class SharesSection:
     nodes: Nodes
     form: Triangle
     rate: Fraction
-    behaviour: Behaviour | None
+    behaviour: Behaviour | None = None
     final_state: Some[Ball] | None = None
 
 
@@ -129,7 +129,7 @@ def check_restricted(
     begin: Begin,
 ) -> None:
     """Verify every claim for restricted signals."""
-    if "restricted" not in doc.data:
+    if "restricted" not in doc:
         return
     items: Sequence[Section] = doc.section("restricted")
     need(0 < len(items) <= MANY_CLAIMS, f"no claim for restricted signals, or more than {MANY_CLAIMS}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any, Literal
 
 from ptcc_certify.checker.agent_cascade import CascadeSection
@@ -20,18 +21,16 @@ from ptcc_certify.checker.family import (
     Counterexample,
     FamilyClaim,
     FamilyComponent,
-    FamilySection,
     KernelWitness,
-    ModeStructures,
 )
 from ptcc_certify.checker.final_state import AgentsVector, FormationSection, InfluenceSection
 from ptcc_certify.checker.graph import GraphSection
 from ptcc_certify.checker.input import EnergyWitness, InputSection, PeakWitness
-from ptcc_certify.checker.lyapunov import FunctionsSection, InertiaWitness, MeanWitness, OvershootSection, RatesSection
+from ptcc_certify.checker.lyapunov import FunctionSection, InertiaWitness, MeanWitness, OvershootSection, RatesSection
 from ptcc_certify.checker.messages import MessagesSection, StepsStart
 from ptcc_certify.checker.missed_deadline import Signs
 from ptcc_certify.checker.protocol import NominalSection, ReachingTimes, SlidingSection
-from ptcc_certify.checker.row_functions import FamilyFunctionsSection
+from ptcc_certify.checker.row_functions import FunctionOfFamily
 from ptcc_certify.checker.section_declarations import (
     Agents,
     Ball,
@@ -51,19 +50,35 @@ from ptcc_certify.checker.weighted_squares import FactorWitness
 
 
 @dataclass(frozen=True, kw_only=True)
+class ProblemSection:
+    """What is asked: the graph, the gain of the protocol, and where the agents begin."""
+
+    graph: GraphSection
+    gain: NominalSection | SlidingSection
+    initial_state: Agents | None = None
+    sliding_variable: Agents | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class SignalProblem(ProblemSection):
+    """What is asked of a family: what its graph does under every signal."""
+
+    signal: Literal["any"]
+
+
+@dataclass(frozen=True, kw_only=True)
 class AnyCertificate:
     """What certificates of one graph and of a family have alike."""
 
-    schema: Literal["ptcc-certificate/2"]
+    schema: Literal["ptcc-certificate/3"]
     producer: str
-    protocol: NominalSection | SlidingSection
-    initial_state: Agents | None
-    sliding_variable: Agents | None
-    reaching_time: ReachingTimes | None
+    problem: ProblemSection
+    structure: Several[StructureSection]
+    reaching_time: ReachingTimes | None = None
+    messages: MessagesSection | None = None
     proof: list[Any]
     digest: Sha256
     unverified: dict[str, Any]
-    messages: MessagesSection | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,17 +95,15 @@ class OfAgents:
 class GraphCertificate(OfAgents, AnyCertificate):
     """A certificate of one graph."""
 
-    graph: GraphSection
-    structure: StructureSection
-    claim: ClaimSection | None
+    claim: ClaimSection | None = None
     components: Unread[Several[ComponentSection] | ManyComponents] | None = None
-    paper: PaperSection | None
-    lyapunov: FunctionsSection
+    paper: PaperSection | None = None
+    decays: Several[FunctionSection]
     rates: RatesSection
-    overshoot: OvershootSection | None
-    influence: InfluenceSection | None
-    final_state: Ends | None
-    input: InputSection | None
+    overshoot: OvershootSection | None = None
+    influence: InfluenceSection | None = None
+    final_state: Ends | None = None
+    input: InputSection | None = None
     verdict: Literal["certified", "undecided"]
 
 
@@ -98,16 +111,12 @@ class GraphCertificate(OfAgents, AnyCertificate):
 class FamilyCertificate(AnyCertificate):
     """A certificate of a family of graphs."""
 
-    graph: FamilySection
-    structure: ModeStructures
-    claim: FamilyClaim | None
+    problem: SignalProblem
+    claim: FamilyClaim | None = None
     components: Several[FamilyComponent] | None = None
-    paper: None
-    lyapunov: FamilyFunctionsSection
-    rates: None
-    overshoot: None
-    influence: None
-    final_state: ByAgent[Ball | None] | None
+    decays: Several[FunctionOfFamily]
+    drives: Several[Fraction] | None = None
+    final_state: ByAgent[Ball | None] | None = None
     input: FamilyInput
     verdict: Literal["certified"]
     boxes: Several[AttractingBox | KeptBox] | None = None

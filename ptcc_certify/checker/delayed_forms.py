@@ -104,7 +104,7 @@ def function_of(doc: Document, verified: Verified, k: Any) -> Constants:
     form = function.form
     if form is None or form.coordinates != "E" or function.rate <= 0:
         raise RejectedError("a Lyapunov function of large graphs, of deviations, or without a rate")
-    deviation, constants = doc.sections["lyapunov"].functions[k].deviation, doc.sections["input"].constants[k]
+    deviation, constants = doc.sections["decays"][k].deviation, doc.sections["input"].constants[k]
     need(deviation is not None, "a Lyapunov function without deviations")
     deviations = deviation.agents
     errors = form.error_constants(graph.n, graph.rational_row)

@@ -7,6 +7,7 @@ proof stands in the functions that verify it, and nowhere else.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from lmi.exact.definite import Arithmetic
@@ -14,6 +15,18 @@ from ptcc_certify.checker.obligations import OBLIGATIONS, VerifiedObligation
 from ptcc_certify.checker.reading import digest, exact, fields, need
 from ptcc_certify.checker.section_declarations import Brings, Context, parts_of, read
 from ptcc_certify.checker.side_files import SideFiles
+
+
+@dataclass(frozen=True, kw_only=True)
+class ObligationSection:
+    """An obligation of the proof; the first four are texts of the format, the others are there where it brings them."""
+
+    kind: str
+    of: str
+    proves: str
+    lemma: str
+    numbers: dict[str, Any] | None = None
+    witness: Any | None = None
 
 
 class Document:
@@ -35,11 +48,11 @@ class Document:
     context : Context
         Labels of agents and of followers, as far as they are known.
     parts : dict
-        How parts are declared, by key.
+        Of every part that is there, by key, how it is declared, and the object that has the key.
     brings : mapping
         What obligations bring, by kind.
     sections : dict
-        What parts say, by key, as far as they were read.
+        What parts say, by key, as far as they were read; None: absent.
     proved : dict
         Numbers and witnesses of obligations, by kind and place.
     """
@@ -50,18 +63,26 @@ class Document:
         self.at, self.sha256 = "format", ""
         self.context, self.sections = Context(files), dict[str, Any]()
         self.proved: dict[tuple[str, str], dict[str, Any]] = {}
-        self.parts: dict[str, Any] = {}
+        self.parts: dict[str, tuple[Any, Any]] = {}
         self.brings: Mapping[str, tuple[Brings, ...]] = {}
 
     def begin(self, certificate: type, brings: Mapping[str, tuple[Brings, ...]]) -> None:
-        """Take what is declared of the parts, which must be there, and no other, and of the obligations."""
-        self.parts = {f.key: f.kind for f in parts_of(certificate, self.data, "the certificate")}
+        """Take what is declared of the parts, those of the problem too, and of the obligations."""
+        for f in parts_of(certificate, self.data, "the certificate"):
+            self.parts[f.key] = f.kind, self.data
+        kind, problem = self.parts.pop("problem")[0], self.data["problem"]
+        self.parts |= {f.key: (f.kind, problem) for f in parts_of(kind, problem, "the problem")}
         self.brings = brings
 
+    def __contains__(self, key: str) -> bool:
+        """Tell whether a part is there."""
+        return key in self.parts
+
     def section(self, key: str) -> Any:
-        """Return a part of the document, as it is declared; it is what is verified next."""
+        """Return a part of the document, as it is declared, None if it is absent; it is what is verified next."""
         self.at = key
-        self.sections[key] = read(self.parts[key], self.data[key], self.context, key)
+        kind, beside = self.parts.get(key, (None, {key: None}))
+        self.sections[key] = read(kind, beside[key], self.context, key)
         return self.sections[key]
 
     def following(self, kind: str, of: str) -> Mapping[str, Any]:
@@ -74,17 +95,18 @@ class Document:
         """Take the next obligation of the proof, which must be this one; return its numbers and its witness."""
         self.at = f"{kind} of {of}"
         need(len(self.obligations) < len(self.data["proof"]), "the proof does not list this obligation")
-        keys = ("kind", "of", "proves", "lemma", "numbers", "witness")
-        obligation = fields(self.data["proof"][len(self.obligations)], keys, "an obligation")
-        texts = [obligation[key] for key in keys[:4]]
+        told: ObligationSection = read(
+            ObligationSection, self.data["proof"][len(self.obligations)], self.context, "an obligation"
+        )
+        texts = [told.kind, told.of, told.proves, told.lemma]
         need(texts == [kind, of, *OBLIGATIONS[kind]], "the proof lists another obligation here")
-        numbers, told = obligation["numbers"], obligation["witness"]
-        declared = self.brings.get(kind, (Brings(),))
-        same = (one for one in declared if isinstance(numbers, dict) and set(numbers) == set(one.numbers.split()))
+        need(told.numbers != {}, "numbers is empty, and not left out")
+        numbers, declared = told.numbers or {}, self.brings.get(kind, (Brings(),))
+        same = (one for one in declared if set(numbers) == set(one.numbers.split()))
         names, witness = next(same, declared[0])
-        need(witness is not None or told is None, "a witness that nothing asks for")
+        need(witness is not None or told.witness is None, "a witness that nothing asks for")
         values = {key: exact(x) for key, x in fields(numbers, names.split(), "numbers").items()}
-        values["witness"] = read(witness, told, self.context, "the witness")
+        values["witness"] = read(witness, told.witness, self.context, "the witness")
         self.proved[kind, of] = values
         return values
 
@@ -101,6 +123,8 @@ class Document:
         verdict = "certified" if proved else "undecided"
         need(self.section("verdict") == verdict, f"what was proved makes it {verdict}")
         need(self.section("digest") == digest(self.data), "the certificate was changed after it was made")
+        self.at = next((key for key in self.parts if key not in self.sections), self.at)
+        need(self.at in self.sections, "nothing verifies this part")
         return verdict
 
 
@@ -131,15 +155,8 @@ class Recorder(Document):
     def open(self, kind: str, of: str) -> dict[str, Any]:
         """Lay down an obligation, and take it as any other."""
         proves, lemma = OBLIGATIONS[kind]
-        obligation: dict[str, Any] = {
-            "kind": kind,
-            "of": of,
-            "proves": proves,
-            "lemma": lemma,
-            "numbers": {},
-            "witness": None,
-        }
-        self.data["proof"].append({**obligation, **self.given.pop((kind, of), {})})
+        brought = {key: x for key, x in self.given.pop((kind, of), {}).items() if x not in (None, {})}
+        self.data["proof"].append({"kind": kind, "of": of, "proves": proves, "lemma": lemma, **brought})
         return super().open(kind, of)
 
     def close(self, proved: bool) -> str:

@@ -43,8 +43,8 @@ class FactorSection:
     exponents: Integers
     bits: int
     power: int
-    weights: Integers | None
-    parents: Integers | None
+    weights: Integers | None = None
+    parents: Integers | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,25 +15,19 @@ from functools import cached_property
 from itertools import chain, groupby, pairwise
 from math import gcd
 from operator import itemgetter
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal
 
 from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import keeps, spend
 from ptcc_certify.checker.document import Document
-from ptcc_certify.checker.graph import NODE_BYTES, digraph
-from ptcc_certify.checker.graph import Edge as KnownEdge
+from ptcc_certify.checker.graph import NODE_BYTES, GraphSection, UncertainEdgesAside, digraph
 from ptcc_certify.checker.reading import Interval, RejectedError, entries, exact, need
 from ptcc_certify.checker.section_declarations import (
     Ball,
     ByNumber,
-    Integers,
-    Labels,
     Node,
     Several,
-    Sha256,
     Some,
-    Unread,
-    Vector,
     read,
 )
 from ptcc_certify.checker.side_files import Numbers, beside
@@ -53,46 +47,6 @@ Row = dict[int, Fraction]
 Edge = tuple[int, int, int, int, int]
 
 
-#: Source, target, least and largest weight.
-UncertainEdge: TypeAlias = tuple[Node, Node, Fraction, Fraction]
-
-
-@dataclass(frozen=True, kw_only=True)
-class ModeEdgesAside:
-    """The edges of a mode in side files."""
-
-    count: int
-    source: Integers
-    target: Integers
-    least: Vector
-    largest: Vector
-
-
-@dataclass(frozen=True, kw_only=True)
-class ModeSection:
-    """A mode: whether both directions of its edges change together, and its edges."""
-
-    name: str
-    undirected: bool
-    edges: Unread[Several[KnownEdge | UncertainEdge] | ModeEdgesAside]
-
-
-@dataclass(frozen=True, kw_only=True)
-class FamilySection:
-    """The agents of a family, and its modes."""
-
-    nodes: Labels
-    modes: Several[ModeSection]
-    sha256: Sha256
-
-
-@dataclass(frozen=True, kw_only=True)
-class ModeStructures:
-    """What the file says of the structure of every mode."""
-
-    modes: Several[StructureSection]
-
-
 @dataclass(frozen=True, kw_only=True)
 class FamilyClaim:
     """What a component does for every signal."""
@@ -105,7 +59,6 @@ class FamilyClaim:
         "bipartite containment",
         "depends on the signal",
     ]
-    signal: Literal["any"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,7 +82,7 @@ class Counterexample:
 
     mode: int
     other: int
-    edge: tuple[Node, Node, Literal[1, -1]] | None
+    edge: tuple[Node, Node, Literal[1, -1]] | None = None
     state: Some[Ball]
 
 
@@ -262,8 +215,8 @@ class Component:
 def check_family(doc: Document) -> Family:
     """Verify modes, structures and what is claimed of every component."""
     labels, drafts = _read_modes(doc)
-    sections: Sequence[StructureSection] = doc.section("structure").modes
-    need(len(sections) == len(drafts), f"modes has not {len(drafts)} entries")
+    sections: Sequence[StructureSection] = doc.section("structure")
+    need(len(sections) == len(drafts), f"structure has not {len(drafts)} entries")
     modes = []
     for number, ((edges, unit, tied), section) in enumerate(zip(drafts, sections, strict=True)):
         on = [edge for edge in edges if edge[3]]
@@ -289,14 +242,16 @@ def _connectivity(structure: Structure) -> str:
 
 
 def _read_modes(doc: Document) -> tuple[list[str], list[tuple[list[Edge], int, bool]]]:
-    section: FamilySection = doc.section("graph")
+    section: GraphSection = doc.section("graph")
     labels, index = section.nodes, doc.context.know(section.nodes)
     need(0 < len(section.modes) <= MANY_MODES, f"no mode, or more than {MANY_MODES}")
+    need(section.read is None, "how the file of a family was read")
     drafts = []
     for mode in section.modes:
+        need(mode.name is not None, "a mode without a name")
         edges, unit = _edges(doc, mode.edges, index)
-        _check_edges(edges, mode.undirected)
-        drafts.append((edges, unit, mode.undirected))
+        _check_edges(edges, tied := mode.undirected is True)
+        drafts.append((edges, unit, tied))
     doc.sha256 = _hash(labels, drafts)
     need(section.sha256 == doc.sha256, "the SHA-256 of the modes is another")
     return labels, drafts
@@ -307,7 +262,7 @@ def _edges(doc: Document, section: Any, index: Mapping[str, int]) -> tuple[list[
     least: Numbers
     largest: Numbers
     if isinstance(section, dict):
-        aside: ModeEdgesAside = read(ModeEdgesAside, section, doc.context, "edges")
+        aside: UncertainEdgesAside = read(UncertainEdgesAside, section, doc.context, "edges")
         count = aside.count
         need(0 < count <= 2 * len(index) ** 2, "edges: count is no number of edges")
         need(keeps(EDGE_BYTES * count), TOO_LARGE)
@@ -397,17 +352,17 @@ def _check_claims(doc: Document, labels: list[str], modes: list[Mode]) -> list[C
     section = [doc.section("claim")]
     need(single or section[0] is None, "the family is disconnected")
     if not single:
-        need("components" in doc.data, 'the key "components" is missing')
+        need("components" in doc, 'the key "components" is missing')
         section = doc.section("components")
         need(len(section) == len(parts), f"components has not {len(parts)} entries")
-    need(not single or "components" not in doc.data, "components of a connected family")
+    need(not single or "components" not in doc, "components of a connected family")
     doc.at = "family-claim of graph"
     need(len(witnesses) == len(parts), f"the witness has not {len(parts)} entries")
     result = []
     for entry, part, witness in zip(section, parts, witnesses, strict=True):
         component = _component(modes, part, witness)
         behaviour: Any = component.behaviour
-        claim = FamilyClaim(theorem=THEOREM, behaviour=behaviour, signal="any")
+        claim = FamilyClaim(theorem=THEOREM, behaviour=behaviour)
         expected = claim if single else FamilyComponent(nodes=part.nodes, claim=claim)
         need(entry == expected, f"what follows is {component.behaviour}")
         result.append(component)

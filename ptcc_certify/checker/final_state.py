@@ -201,8 +201,8 @@ class InfluenceSection:
     """Left null vectors, containment weights unless the graph is large, and which groups meet at 0."""
 
     components: Several[LeftNullVector]
-    containment_weights: ByFollower[Several[Ball]] | None
-    degenerate: Several[int] | None
+    containment_weights: ByFollower[Several[Ball]] | None = None
+    degenerate: Several[int] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -217,8 +217,8 @@ class FormationSection:
     """The places of agents in a formation, and where they begin and end."""
 
     offsets: Agents
-    initial_state: Agents | None
-    final_state: Ends | None
+    initial_state: Agents | None = None
+    final_state: Ends | None = None
 
 
 def check_final_state(doc: Document, structure: Structure, claim: Claim, begin: Begin) -> FinalState:
@@ -244,7 +244,7 @@ def check_final_state(doc: Document, structure: Structure, claim: Claim, begin: 
         need(influence.degenerate is None, "a final state without an initial state")
     else:
         detail = f"enclosed, radius at most {up(_final(final, final_state, influence.degenerate, begin))}"
-        _components(graph, claim, doc.data["final_state"])
+        _components(graph, claim, doc.data.get("final_state"))
     doc.done("exact" if final.exact else detail)
     return final
 
@@ -364,9 +364,9 @@ def _narrow(label: str, off: Any, error: Any, radius: Any, spare: Any) -> None:
 
 def check_formation(doc: Document, graph: Digraph, begin: Begin) -> None:
     """Verify that agents of a formation begin and end where the rest of the document tells, and their places added."""
-    if "formation" not in doc.data:
+    if "formation" not in doc:
         return
-    need("agents" not in doc.data, "a formation beside that of agents of order n")
+    need("agents" not in doc, "a formation beside that of agents of order n")
     section, end = doc.section("formation"), doc.sections["final_state"]
     told = (section.initial_state, begin.state), (section.final_state, end)
     need(all((x is None) == (y is None) for x, y in told), "positions are told iff states are")

@@ -12,7 +12,18 @@ from lmi.exact.work import keeps
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.reading import entries, exact, fields, need
-from ptcc_certify.checker.section_declarations import Column, Labels, Node, Pattern, Several, Sha256, Unread, read
+from ptcc_certify.checker.section_declarations import (
+    Column,
+    Integers,
+    Labels,
+    Node,
+    Pattern,
+    Several,
+    Sha256,
+    Unread,
+    Vector,
+    read,
+)
 from ptcc_certify.checker.side_files import Numbers, beside
 
 #: From this number of edges on NumPy is used, where it is there.
@@ -23,6 +34,8 @@ NODE_BYTES, EDGE_BYTES = 700, (100, 300)
 
 #: Source, target, and weight.
 Edge: TypeAlias = tuple[Node, Node, Fraction]
+#: Source, target, least and largest weight.
+UncertainEdge: TypeAlias = tuple[Node, Node, Fraction, Fraction]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,6 +47,26 @@ class EdgesAside:
     target: Column
     weight: Column
     scale: Fraction
+
+
+@dataclass(frozen=True, kw_only=True)
+class UncertainEdgesAside:
+    """Edges of a mode of a family in side files."""
+
+    count: int
+    source: Integers
+    target: Integers
+    least: Vector
+    largest: Vector
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModeSection:
+    """A mode: its edges; of a family its name, and whether both directions of edges change together."""
+
+    name: str | None = None
+    undirected: Literal[True] | None = None
+    edges: Unread[Several[Edge | UncertainEdge] | EdgesAside | UncertainEdgesAside]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,20 +85,23 @@ class ReadSection:
 
 @dataclass(frozen=True, kw_only=True)
 class GraphSection:
-    """The graph: agents, and who listens to whom."""
+    """The graph: agents, and who listens to whom, in every mode; of one fixed graph how its file was read."""
 
     nodes: Labels
-    edges: Unread[Several[Edge] | EdgesAside]
-    read: ReadSection
+    modes: Several[ModeSection]
+    read: ReadSection | None = None
     sha256: Sha256
 
 
 def check_graph(doc: Document) -> Digraph:
-    """Read nodes and edges; verify their order and their hash."""
+    """Read nodes and edges of one fixed graph; verify their order and their hash."""
     section: GraphSection = doc.section("graph")
     labels, index = section.nodes, doc.context.know(section.nodes)
+    need(len(section.modes) == 1 and section.read is not None, "a fixed graph has one mode, and tells how it was read")
+    mode = section.modes[0]
+    need(mode.name is None and mode.undirected is None, "a name, or undirected, of the mode of a fixed graph")
     _fit(NODE_BYTES * len(labels))
-    graph = digraph(doc, labels, *_edges(doc, section.edges, index))
+    graph = digraph(doc, labels, *_edges(doc, mode.edges, index))
     doc.sha256, doc.context.edges = graph.sha256(), graph.n_edges
     need(section.sha256 == doc.sha256, "the SHA-256 of the edge list is another")
     return graph

@@ -52,8 +52,8 @@ MANY_LIMITS = 100
 class Threshold:
     """Proved bounds of ``rho2 kappa min Re lambda``."""
 
-    lower: Fraction | None
-    upper: Fraction | None
+    lower: Fraction | None = None
+    upper: Fraction | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,14 +110,14 @@ class NoiseSection:
 class LimitedSection:
     """What is left at the deadline under limits of the gain."""
 
-    gain_cap: Positive | None
-    stop_before: Positive | None
-    sample_period: Positive | None
+    gain_cap: Positive | None = None
+    stop_before: Positive | None = None
+    sample_period: Positive | None = None
     clock: Fraction
     norm: Fraction
-    agents: FewAgents | None
-    largest: Fraction | None
-    noise: NoiseSection | None
+    agents: FewAgents | None = None
+    largest: Fraction | None = None
+    noise: NoiseSection | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,23 +126,23 @@ class DisturbedSection:
 
     delta: Positive
     inputs: FewAgents
-    drift: FewAgents | None
+    drift: FewAgents | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class InputSection:
     """What the file says of the input."""
 
-    bounded: bool | None
+    bounded: bool | None = None
     threshold: Threshold
-    initial_set: Box | Ellipsoid | None
+    initial_set: Box | Ellipsoid | None = None
     constants: Several[FewAgents | None]
-    peak: PeakSection | None
-    energy: Fraction | None
-    path_length: Fraction | None
-    sliding: SlidingPart | None
+    peak: PeakSection | None = None
+    energy: Fraction | None = None
+    path_length: Fraction | None = None
+    sliding: SlidingPart | None = None
     residual: Several[LimitedSection]
-    disturbed: DisturbedSection | None
+    disturbed: DisturbedSection | None = None
 
 
 @dataclass(frozen=True)
@@ -258,7 +258,7 @@ def check_constants(doc: Document, graph: Digraph, function: Function, k: int, v
     form = function.form
     if form is None or form.matrix is None:
         raise RejectedError("constants that follow from a diagonal")
-    doc.open("input-constants", f"lyapunov.functions[{k}]")
+    doc.open("input-constants", f"decays[{k}]")
     constants = list(values)
     P, scale = form.entries
     units = ([int(node == v) for node in form.nodes] for v in range(graph.n))

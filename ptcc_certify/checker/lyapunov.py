@@ -52,17 +52,10 @@ class FunctionSection:
     class_: Literal["paper", "perron", "lmi", "full"]
     coordinates: Literal["E", "eps"]
     blocks: Several[BlockSection]
-    rho: Fraction | None
+    rho: Fraction | None = None
     rate: Fraction
     overshoot: Fraction
-    deviation: DeviationSection | None
-
-
-@dataclass(frozen=True, kw_only=True)
-class FunctionsSection:
-    """The Lyapunov functions that are used."""
-
-    functions: Several[FunctionSection]
+    deviation: DeviationSection | None = None
 
 
 @dataclass(frozen=True)
@@ -100,7 +93,7 @@ class Function:
 
 def check_functions(doc: Document, structure: Structure, final: FinalState, paper: Paper | None) -> list[Function]:
     """Verify every Lyapunov function."""
-    items, of_paper = doc.section("lyapunov").functions, paper is not None and paper.rate is not None
+    items, of_paper = doc.section("decays"), paper is not None and paper.rate is not None
     need(len(items) <= MANY_FUNCTIONS, f"more than {MANY_FUNCTIONS} Lyapunov functions")
     need(not of_paper or bool(items), "the paper's certificate is not among the Lyapunov functions")
     need(bool(structure.graph.listening) or not items, "a Lyapunov function where nothing moves")
@@ -108,7 +101,7 @@ def check_functions(doc: Document, structure: Structure, final: FinalState, pape
     form: tuple[Matrix, Fraction] | None
     proofs: Proved = set()
     for k, entry in enumerate(items):
-        doc.at = of = f"lyapunov.functions[{k}]"
+        doc.at = of = f"decays[{k}]"
         if k == 0 and paper is not None and of_paper:
             function, form = _of_paper(doc, paper, entry)
         elif entry.class_ in ("perron", "lmi") and doc.following("dominance", of):
@@ -223,10 +216,10 @@ def _deviation(
 class RatesSection:
     """Rates: the paper's, the largest of diagonal functions, the largest of all, and what no rate exceeds."""
 
-    paper: Fraction | None
-    diagonal: Fraction | None
-    proved: Fraction | None
-    upper_bound: Fraction | None
+    paper: Fraction | None = None
+    diagonal: Fraction | None = None
+    proved: Fraction | None = None
+    upper_bound: Fraction | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -127,7 +127,7 @@ def need_left(
     """
     need(cap is None or b * cap * messages.delay <= log(q)[0], "b cap delay is above ln q")
     limit = min((x for x in (cap, messages.gain_cap) if x is not None), default=None)
-    need((limit is None) == (clock is None), "clock is null iff nothing caps the gain")
+    need((limit is None) == (clock is None), "clock is told iff something caps the gain")
     if limit is None or clock is None:
         need(left == 0, "left is not 0 though the clock goes on for ever")
     else:
@@ -149,12 +149,12 @@ class Delays:
     """What the file says of how late messages are; ``latency``: one number for all edges, or one for each."""
 
     latency: Fraction | EdgeNumbers
-    packets: Packets | None
+    packets: Packets | None = None
     delay: Fraction
     own: Literal["fresh", "late"]
     value_error: NotNegative
-    gain_cap: Positive | None
-    leaders: Moving | None
+    gain_cap: Positive | None = None
+    leaders: Moving | None = None
 
 
 def check_delays(gain: PrescribedGain, section: Delays) -> Messages:

@@ -38,8 +38,8 @@ OF_ONE_GRAPH = ("steps", *AT_REST)
 class RowsBound:
     """A bound by rows; ``drift`` and ``after`` where leaders move."""
 
-    cap: Positive | None
-    clock: Fraction | None
+    cap: Positive | None = None
+    clock: Fraction | None = None
     left: Fraction
     initial: Fraction
     floor: Fraction
@@ -66,20 +66,20 @@ class MessagesSection(Delays):
     """What the file says of late messages."""
 
     rows: Several[RowsBound]
-    steps: StepsBound | None
-    residual: Agents | None
-    missed: MissedDeadline | None
-    staged: ByFollower[Fraction] | None
-    settling: SettlingSection | None
-    form: LateForm | None
-    lmi: LateLMI | None
-    input: Agents | None
+    steps: StepsBound | None = None
+    residual: Agents | None = None
+    missed: MissedDeadline | None = None
+    staged: ByFollower[Fraction] | None = None
+    settling: SettlingSection | None = None
+    form: LateForm | None = None
+    lmi: LateLMI | None = None
+    input: Agents | None = None
     vehicles: VehiclesSection | None = None
 
 
 def check_messages(doc: Document, of: Verified | Family, protocol: Protocol, begin: Begin) -> None:
     """Verify everything that is said of late messages, if there is something."""
-    if "messages" not in doc.data:
+    if "messages" not in doc:
         return
     if isinstance(of, Family):
         doc.context.edges = len(of.pairs)
@@ -148,7 +148,7 @@ def _check_rows(
     obligation = doc.open("late-rows", of)
     q, b = obligation["q"], obligation["b"]
     need(q > 1 or (q == 1 and messages.delay == 0), "q is not above 1")
-    need((cap is None) == (messages.delay == 0), "cap is null iff nothing is late")
+    need((cap is None) == (messages.delay == 0), "cap is told iff something is late")
     bits = length((q, b, left, clock or left, cap or left, messages.delay, messages.gain.T, messages.gain.rho1))
     spend(50, bits, bits, "rows of followers")
     rows = Rows(followers, obligation["witness"].u)

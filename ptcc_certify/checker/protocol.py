@@ -83,7 +83,7 @@ class SlidingSection:
     mu2: Positive
     mu3: Positive
     delta: NotNegative
-    disturbance: str | None
+    disturbance: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,7 +91,7 @@ class SlidingPart:
     """Whether the sliding part of the input is bounded for every ``sigma(0)``, and bounds of it."""
 
     bounded: bool
-    agents: FewAgents | None
+    agents: FewAgents | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,9 +113,9 @@ class Begin:
 
 def check_protocol(doc: Document) -> Protocol:
     """Read the parameters, which are positive; mu1 is above delta."""
-    section = doc.section("protocol")
+    section = doc.section("gain")
     gains = {name: value for name, value in vars(section).items() if name not in ("kind", "disturbance")}
-    need(section.rho1 > 0 or "agents" in doc.data, "rho1 is not positive")  # that of agents of order n may be 0
+    need(section.rho1 > 0 or "agents" in doc, "rho1 is not positive")  # that of agents of order n may be 0
     if isinstance(section, SlidingSection):
         need(section.delta < section.mu1, "mu1 is not above delta")
     return Protocol(isinstance(section, SlidingSection), gains)
@@ -136,7 +136,7 @@ def check_sliding(doc: Document, graph: Digraph, protocol: Protocol, begin: Begi
         need(sigma0 is None and section is None, "reaching times are told iff there are sliding variables")
         return
     need(section.bound == SLIDING_BOUND and section.clock == SLIDING_CLOCK, "another bound or clock")
-    doc.open("sliding-bound", "protocol")
+    doc.open("sliding-bound", "gain")
     doc.done("for every disturbance within delta")
     z = section.z
     if not any(x is not None and s for x, s in zip(z, sigma0, strict=True)):

@@ -16,7 +16,7 @@ from typing import Any
 from lmi.exact.numbers import NumberError, longest, parse, shorten
 from lmi.exact.work import fits, keeps
 
-SCHEMA = "ptcc-certificate/2"
+SCHEMA = "ptcc-certificate/3"
 #: Largest file.
 MAX_BYTES = 200_000_000
 #: Bytes that the JSON may take in memory, by :func:`loaded_bytes`.

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Literal
+from typing import Literal, TypeAlias
 
 from lmi.exact.decimal_rounding import down
 from lmi.exact.elementary_enclosures import rounded
@@ -59,12 +59,8 @@ class RowsSection:
     rate: Fraction
 
 
-@dataclass(frozen=True, kw_only=True)
-class FamilyFunctionsSection:
-    """The Lyapunov functions of a family, and ``drives`` of them while sliding variables move."""
-
-    functions: Several[FormSection | RowsSection | SquaresSection]
-    drives: Several[Fraction] | None = None
+#: What a file says of a function of a family.
+FunctionOfFamily: TypeAlias = FormSection | RowsSection | SquaresSection
 
 
 @dataclass(frozen=True)
@@ -133,11 +129,11 @@ Function = FamilyFunction | FollowerFunction | SquaresFunction
 
 def check_family_functions(doc: Document, family: Family) -> list[Function]:
     """Verify every function, its rates and constants."""
-    items = doc.section("lyapunov").functions
+    items = doc.section("decays")
     need(len(items) <= MANY_FUNCTIONS, f"more than {MANY_FUNCTIONS} Lyapunov functions")
     result: list[Function] = []
     for k, entry in enumerate(items):
-        doc.at = of = f"lyapunov.functions[{k}]"
+        doc.at = of = f"decays[{k}]"
         component = family.component(entry.component)
         need(not component.depends, "a Lyapunov function where there is no common kernel")
         if isinstance(entry, RowsSection):

@@ -1,8 +1,8 @@
 """One declaration for each section of a certificate: a frozen dataclass whose annotations say what may stand there.
 
-A section is read strictly: no key more, none missing, no value of another type. ``null`` stands for None; a key is left
-out only where its field has the default None, and of those that ``one_of`` names one is there. What makes certificates
-writes by the same declarations, and the JSON schema is printed from them.
+A section is read strictly: no key more, none missing, no value of another type. Where a field is None its key is left
+out; ``null`` stands for None in lists and among values by agent alone. Of the keys that ``one_of`` names one is there.
+What makes certificates writes by the same declarations, and the JSON schema is printed from them.
 """
 
 from __future__ import annotations

@@ -236,13 +236,12 @@ def check_drive(
         times = doc.sections["reaching_time"].z
         edges = ([(s, t, Fraction(high, mode.unit)) for s, t, _, _, high in mode.edges] for mode in family.modes)
         result = Drive.of(protocol.gains, sigma0, last_time(times, begin.sigma), list(edges))
-    doc.at = "lyapunov.drives"
-    drives = doc.sections["lyapunov"].drives
+    drives = doc.section("drives")
     need((result is None) == (drives is None), "drives belong to sliding variables that move")
     if result is not None:
         need(len(drives) == len(functions), f"drives has not {len(functions)} entries")
         for k, (V, drive) in enumerate(zip(functions, drives, strict=True)):
-            doc.open("family-drive", f"lyapunov.functions[{k}]")
+            doc.open("family-drive", f"decays[{k}]")
             need(drive >= result.constant(V), "what drives the function is not proved")
             doc.done(f"c = {up(drive)}")
     return result
@@ -401,8 +400,8 @@ def check_family_bounds(
 class FamilyInput:
     """What the file says of the input for every signal; ``sliding`` under the sliding-mode protocol."""
 
-    bounded: bool | None
-    peaks: FewAgents | None
+    bounded: bool | None = None
+    peaks: FewAgents | None = None
     sliding: SlidingPart | None = None
 
 

@@ -84,7 +84,7 @@ class ComponentSection:
     nodes: Several[Node]
     connectivity: Connectivity
     claim: ClaimSection
-    final_state: Some[Ball] | None
+    final_state: Some[Ball] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,7 +157,7 @@ class Claim:
     components: list[tuple[list[int], Any]]
 
 
-def check_structure(doc: Document, graph: Digraph, section: StructureSection, of: str = "graph") -> Structure:
+def check_structure(doc: Document, graph: Digraph, section: StructureSection, of: str) -> Structure:
     """Verify closed components, camps, leaders and followers, and every witness."""
     doc.open("structure", of)
     closed: list[list[int]] = []
@@ -227,12 +227,12 @@ def _negative_cycle(doc: Document, graph: Digraph, entry: Any, group: set[int]) 
 def check_claim(doc: Document, structure: Structure, sliding: bool) -> Claim:
     """Verify theorem, behaviour and corollaries of every weak component."""
     doc.open("claim", "graph")
-    connectivity, expected = doc.sections["structure"].connectivity, _expected(structure, sliding)
+    connectivity, expected = doc.sections["structure"][0].connectivity, _expected(structure, sliding)
     section: ClaimSection | None = doc.section("claim")
     doc.at = "claim of graph"
     if len(expected) == 1:
         ((_, kind, claim),) = expected
-        need("components" not in doc.data, "components of a connected graph")
+        need("components" not in doc, "components of a connected graph")
         need(connectivity == kind, f"the graph is {kind}")
         need(section == claim, f"the claim is Theorem {claim.theorem}")
         verified = Claim(claim.theorem, [])
@@ -276,7 +276,8 @@ def _expected(structure: Structure, sliding: bool) -> list[tuple[list[int], str,
 
 def _components(doc: Document, graph: Digraph, expected: Sequence[Any]) -> list[tuple[list[int], Any]]:
     """Check what is said of each weak component; return its nodes and the final state that is claimed."""
-    section, groups = doc.data.get("components"), [nodes for nodes, _, _ in expected]
+    section, groups = doc.section("components"), [nodes for nodes, _, _ in expected]
+    doc.at = "claim of graph"
     labels = [[graph.labels[v] for v in nodes] for nodes in groups]
     states: list[Any] = [None] * len(groups)
     reference: Any
@@ -284,7 +285,8 @@ def _components(doc: Document, graph: Digraph, expected: Sequence[Any]) -> list[
         items = entries(section, "components", len(groups))
         states = [entry.get("final_state") if isinstance(entry, dict) else None for entry in items]
         reference = [
-            {"nodes": nodes, "connectivity": kind, "claim": vars(claim), "final_state": state}
+            {"nodes": nodes, "connectivity": kind, "claim": vars(claim)}
+            | ({} if state is None else {"final_state": state})
             for nodes, (_, kind, claim), state in zip(labels, expected, states, strict=True)
         ]
     else:

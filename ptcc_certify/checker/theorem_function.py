@@ -37,8 +37,8 @@ class BlockSection:
 class RhoInterval:
     """The end of the interval of ``rho`` that the paper prints, and an admissible one; None: no end."""
 
-    printed: Fraction | None
-    exact: Fraction | None
+    printed: Fraction | None = None
+    exact: Fraction | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,10 +49,10 @@ class PaperSection:
     objective: str
     coordinates: Literal["E", "eps"]
     blocks: Several[BlockSection]
-    rho: Positive | None
-    rho_interval: RhoInterval | None
-    rate: Positive | None
-    overshoot: Fraction | None
+    rho: Positive | None = None
+    rho_interval: RhoInterval | None = None
+    rate: Positive | None = None
+    overshoot: Fraction | None = None
 
 
 class Block(NamedTuple):

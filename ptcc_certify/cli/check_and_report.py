@@ -97,8 +97,8 @@ def _own_graph(document: dict[str, Any], report: CheckReport) -> list[str]:
     """
     if not report.accepted:
         return []
-    graph = document["graph"]
-    modes = graph.get("modes", [graph])
+    graph = document["problem"]["graph"]
+    modes = graph["modes"]
     edges = [mode["edges"] for mode in modes]
     count = sum(listed["count"] if isinstance(listed, dict) else len(listed) for listed in edges)
     sizes = [counted(len(graph["nodes"]), "node"), counted(count, "edge")]

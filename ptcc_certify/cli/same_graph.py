@@ -79,7 +79,7 @@ class _Pair:
 
     @property
     def kind(self) -> str:
-        return "family" if "modes" in self.document["graph"] else "graph"
+        return "family" if "signal" in self.document["problem"] else "graph"
 
     def compare(self, options: shared.Options) -> Compared:
         """Compare the files, read as these options say, with the certificate."""
@@ -113,7 +113,7 @@ class _Pair:
         from ptcc_certify.graphs.difference import family_difference, mode_order
         from ptcc_certify.graphs.io.family_files import family_flags, read_family
 
-        meant = certificate_family(self.document["graph"], read_side_files(self.document, self.folder))
+        meant = certificate_family(self.document["problem"]["graph"], read_side_files(self.document, self.folder))
         family = read_family(self.files, **family_keywords(options))
         facts = {"graph_read": family_flags(family.read, self.graphs[0])}
         order = mode_order(meant, family)
@@ -137,7 +137,7 @@ class _Pair:
         if self.kind == "family":
             keywords = keywords_of(self.document["unverified"].get("read"))
         else:
-            file, read = self.files[0], self.document["graph"]["read"]
+            file, read = self.files[0], self.document["problem"]["graph"]["read"]
             try:
                 if is_family_file(file):  # in which all weights are known
                     keywords = {"orientation": read["orientation"], **options_of_record(read)}

@@ -89,7 +89,7 @@ def kind_of(path: str) -> str:
     --------
     >>> with TemporaryDirectory() as folder:
     ...     file = Path(folder, "c.json")
-    ...     _ = file.write_text('{"schema": "ptcc-certificate/2"}')
+    ...     _ = file.write_text('{"schema": "ptcc-certificate/3"}')
     ...     kind_of(str(file)), kind_of(folder), kind_of(f"{folder}/d.json")
     ('a certificate', 'a folder', 'missing')
     """
@@ -114,7 +114,7 @@ def kind_of_content(first: bytes, ending: str) -> str:
 
     Examples
     --------
-    >>> kind_of_content(b'{"schema": "ptcc-certificate/2"}', ""), kind_of_content(b"a,b,1", "csv")
+    >>> kind_of_content(b'{"schema": "ptcc-certificate/3"}', ""), kind_of_content(b"a,b,1", "csv")
     ('a certificate', '')
     """
     if ending in ("toml", "") and re.search(rb"^\s*\[graph\]\s*(#.*)?$", first, re.MULTILINE):
@@ -166,7 +166,7 @@ def refuse_content_as_graph(content: bytes, name: str, ending: str, path: object
 
     Examples
     --------
-    >>> refuse_content_as_graph(b'{"schema": "ptcc-certificate/2"}', "standard input", "", "-")
+    >>> refuse_content_as_graph(b'{"schema": "ptcc-certificate/3"}', "standard input", "", "-")
     Traceback (most recent call last):
     ptcc_certify.errors.FormatError: standard input: is a certificate, not a graph; ptcc check - checks it, ...
     """

@@ -20,9 +20,8 @@ docs/theory/families.md, "Rows". Howard, Dynamic Programming and Markov Processe
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 
@@ -30,7 +29,7 @@ from lmi.dyadic import dyadic_array, round_array
 from lmi.exact.elementary_enclosures import rounded
 from lmi.sparse_h_matrix import positive_vector, smallest_eigenvalue
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.graphs.structure import analyse, find_camps
+from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.lyapunov.interval_rows import IntervalRows, Policy, least_quotient
 from ptcc_certify.theorems.kernel import reached
 
@@ -38,8 +37,6 @@ from ptcc_certify.theorems.kernel import reached
 _ROUNDS, _TRIALS = 40, 24
 #: Relative distance of the search from the smallest eigenvalue, and at which it ends.
 _NEAR, _TOLERANCE = 1e-6, 1e-3
-#: Strong components of more than one node in which the slowest member is looked for.
-_COMPONENTS = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,18 +51,11 @@ class FollowerDecay:
         ``d``, up to a common factor.
     rate : Fraction
         ``alpha`` of the norm, per unit of the clock; that of squared functions is twice this.
-    upper_bound : Fraction or None
-        The smallest eigenvalue of ``L_F`` of the member ``slowest`` is not larger: no certificate proves more. None
-        where modes, weights that change together or edges that keep no camps leave open whether one does.
-    slowest : Policy or None
-        That member.
     """
 
     nodes: np.ndarray
     vector: np.ndarray
     rate: Fraction
-    upper_bound: Fraction | None = None
-    slowest: Policy | None = None
 
     @property
     def overshoot(self) -> Fraction:
@@ -115,9 +105,8 @@ def follower_decay(family: Family, nodes: np.ndarray | None = None, loss: float 
     Examples
     --------
     >>> chain = Family.from_intervals([("a", "b", 1, 2), ("b", "c", 3, 4), ("c", "b", 1, 2)])
-    >>> decay = follower_decay(chain)
-    >>> round(float(decay.rate), 5), round(float(decay.upper_bound), 5)
-    (0.55051, 0.55051)
+    >>> round(float(follower_decay(chain).rate), 5)
+    0.55051
     """
     return next(follower_decays(family, nodes, [loss]), None)
 
@@ -140,22 +129,12 @@ def follower_decays(family: Family, nodes: np.ndarray | None, losses: Iterable[f
         found = _largest_rate(rows) if nodes.size else None
         if found is None:
             return
-        t, policies = found
-        bound = _least_bound(rows, policies) if _is_exact(family, rows, nodes) else {}
+        t, policy = found
     for loss in losses:
         with np.errstate(all="ignore"):
-            d, _ = _vector(rows, t * (1 - loss), policies[0])
+            d, _ = _vector(rows, t * (1 - loss), policy)
         if d is not None and (decay := prove_follower_decay(rows, nodes, d)) is not None:
-            yield replace(decay, **bound)
-
-
-def _least_bound(rows: IntervalRows, policies: Iterable[Policy]) -> dict[str, Any]:
-    best: dict[str, Any] = {}
-    for policy in policies:
-        bound = _rate_of_member(rows, policy)
-        if bound is not None and (not best or bound < best["upper_bound"]):
-            best = {"upper_bound": bound, "slowest": policy}
-    return best
+            yield decay
 
 
 def prove_follower_decay(rows: IntervalRows, nodes: np.ndarray, d: np.ndarray) -> FollowerDecay | None:
@@ -217,10 +196,9 @@ def _vector(rows: IntervalRows, t: float, policy: Policy) -> tuple[np.ndarray | 
     return None, policy
 
 
-def _largest_rate(rows: IntervalRows) -> tuple[float, list[Policy]] | None:
-    """Return a rate just below the largest, and policies of members that are slow; None if none is positive."""
-    policy = rows.worst(_extended(rows, np.ones(rows.n)))
-    low, refused = 0.0, policy
+def _largest_rate(rows: IntervalRows) -> tuple[float, Policy] | None:
+    """Return a rate just below the largest, and the policy of a member that is slow; None if none is positive."""
+    policy, low = rows.worst(_extended(rows, np.ones(rows.n))), 0.0
     for _ in range(_ROUNDS):
         found = smallest_eigenvalue(rows.system(policy), shifted=True)
         if found is None:
@@ -235,7 +213,7 @@ def _largest_rate(rows: IntervalRows) -> tuple[float, list[Policy]] | None:
         policy = new
     # The bound of the eigenvalue of a block that is nearly triangular is far below it: the test itself decides.
     if low:
-        d, refused = _vector(rows, high, policy)
+        d, _ = _vector(rows, high, policy)
         if d is not None:
             low, high = high, float(rows.system(policy).diagonal().min())
     for _ in range(_TRIALS):
@@ -243,48 +221,5 @@ def _largest_rate(rows: IntervalRows) -> tuple[float, list[Policy]] | None:
             break
         t = (low + high) / 2
         d, new = _vector(rows, t, policy)
-        low, high, policy, refused = (t, high, new, refused) if d is not None else (low, t, policy, new)
-    return (low, [policy, refused]) if low > 0 else None
-
-
-# ---------------------------------------------------------------------- no more
-
-
-def _is_exact(family: Family, rows: IntervalRows, nodes: np.ndarray) -> bool:
-    """Tell whether the slowest member is that of the rows: one mode, independent weights, camps."""
-    if rows.modes > 1:
-        return False
-    inside = rows.source < rows.n
-    if family.modes[0].tied and (rows.lower != rows.upper)[inside].any():
-        return False
-    _, violated, _ = find_camps(nodes.size, rows.source[inside], rows.target[inside], rows.sign[inside])
-    return violated.size == 0
-
-
-def _rate_of_member(rows: IntervalRows, policy: Policy) -> Fraction | None:
-    """Bound the smallest eigenvalue of a member from above, proved: ``max_k (M y)_k / y_k`` over a strong component.
-
-    With ``y = 0`` elsewhere, ``M y <= b y``, and the smallest eigenvalue of ``M`` is at most ``b``.
-    """
-    from scipy.sparse.csgraph import connected_components
-
-    M = rows.system(policy)
-    _, strong = connected_components(M, directed=True, connection="strong")
-    size = np.bincount(strong)
-    diagonal = M.diagonal()
-    alone = np.flatnonzero(size[strong] == 1)
-    candidates = [] if not alone.size else [alone[[np.argmin(diagonal[alone])]]]
-    for number in np.argsort(-size)[:_COMPONENTS].tolist():
-        if size[number] > 1:
-            candidates.append(np.flatnonzero(strong == number))
-    best = None
-    for own in candidates:
-        y = np.zeros(rows.n + rows.outside, dtype=object)
-        found = smallest_eigenvalue(M[own][:, own], shifted=True)
-        if found is None:
-            continue
-        y[own] = dyadic_array(round_array(found[1]))[0].astype(object)
-        pull = rows.pull_of(policy, y)[own]
-        bound = -least_quotient(-pull, y[own]) * rows.unit
-        best = bound if best is None or bound < best else best
-    return None if best is None else rounded(best, 53, up=True)
+        low, high, policy = (t, high, new) if d is not None else (low, t, policy)
+    return (low, policy) if low > 0 else None

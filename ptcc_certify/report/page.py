@@ -189,7 +189,7 @@ def _view(saved: Certificate) -> dict[str, Any]:
         text
         for text, lacking in {
             "no decay was proved": saved.proof.rate is None and not saved.proof.constant,
-            "no final state was proved": source is not None and source.document.get("influence", 0) is None,
+            "no final state was proved": source is not None and "influence" not in source.document,
         }.items()
         if lacking
     ]

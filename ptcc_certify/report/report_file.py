@@ -45,7 +45,7 @@ def write_report(
     Parameters
     ----------
     certificate : path, mapping, Certificate
-        A file of schema ``ptcc-certificate/2`` (``"-"``: standard input), its parsed JSON, or a certificate.
+        A file of schema ``ptcc-certificate/3`` (``"-"``: standard input), its parsed JSON, or a certificate.
     output : path
         The suffix decides what is written.
     simulation : bool, optional

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ptcc_certify.certificate.fact import Fact
+from ptcc_certify.checker.family import THEOREM
 from ptcc_certify.errors import PTCCError, Spelling, spell
 from ptcc_certify.report.facts.claim import WHATEVER
 from ptcc_certify.report.text_layout import TEXT, columns, format_lines, wrap_lines
@@ -125,7 +126,7 @@ def check_summary(path: str, document: Mapping[str, Any], report: CheckReport) -
     """
     lines = []
     if report.accepted:
-        claims = [part["claim"] for part in document.get("components") or [document]]
+        claims = _file_claims(document)
         texts = sorted({_file_claim(claim) for claim in claims})
         where = f" in {len(claims)} components" if len(claims) > 1 else ""
         lines = format_lines([("claim", ", ".join(texts) + where)])
@@ -135,9 +136,18 @@ def check_summary(path: str, document: Mapping[str, Any], report: CheckReport) -
     return wrap_lines([*lines, report.lines()[-1]])
 
 
+def _file_claims(document: Mapping[str, Any]) -> list[Mapping[str, str]]:
+    """Return the claims of a file: of many components their parts stand in arrays."""
+    components = document.get("components", [document])
+    if isinstance(components, list):
+        return [part["claim"] for part in components]
+    pairs = zip(components["theorem"], components["behaviour"], strict=True)
+    return [{"theorem": theorem, "behaviour": behaviour} for theorem, behaviour in pairs]
+
+
 def _file_claim(claim: Mapping[str, str]) -> str:
     """Tell a claim of a file in a few words."""
-    if "signal" not in claim:
+    if claim["theorem"] != THEOREM:
         return f"{claim['behaviour']} (Theorem {claim['theorem']})"
     return claim["behaviour"] if claim["behaviour"] == DEPENDS else f"{claim['behaviour']} {WHATEVER['any']}"
 

@@ -269,7 +269,7 @@ def test_a_row_is_what_certify_says(options: tuple[str, ...], graph: str):
 
     (row,) = parquet.read_table("t.parquet").to_pylist()
     said = json.loads(ptcc("certify", row["graph"], "--seed", str(row["seed"]), "--json", *options).out)
-    assert row["sha256"] == said["graph"]["sha256"]
+    assert row["sha256"] == said["problem"]["graph"]["sha256"]
     assert (row["theorem"], row["behaviour"]) == (said["claim"]["theorem"], said["claim"]["behaviour"])
     assert row["verdict"] == said["verdict"] == "certified"
     rate, limit = Fraction(said["rates"]["proved"]), Fraction(said["rates"]["upper_bound"])
@@ -278,7 +278,7 @@ def test_a_row_is_what_certify_says(options: tuple[str, ...], graph: str):
     assert Fraction(row["optimality_ratio"]) <= rate / Fraction(row["upper_bound"]) * (1 + Fraction(1, 10**15))
     assert Fraction(row["paper_rate"]) <= Fraction(said["rates"]["paper"])
     assert row["obligations"] == len(said["proof"])
-    assert [*said["initial_state"].values()] == [str(x) for (x,) in random_states(row["seed"], row["nodes"])]
+    assert [*said["problem"]["initial_state"].values()] == [str(x) for (x,) in random_states(row["seed"], row["nodes"])]
     assert row["worst_ratio"] == said["unverified"]["simulation"]["worst_ratio"]
     assert row["bound_kept"] is True
     assert (row["reaching_time"] is not None) == ("sliding-mode" in options)

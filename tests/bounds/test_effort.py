@@ -641,7 +641,8 @@ def forged(effort: dict[str, Any]) -> list[tuple[tuple[str | int, ...], Any]]:
     new: list[tuple[tuple[str | int, ...], Any]] = [(("bounded",), not effort["bounded"])]
 
     def lower(path: tuple[str | int, ...], factor: Fraction = LESS) -> None:
-        value = at(effort, path)
+        place = at(effort, path[:-1])
+        value = place.get(path[-1]) if isinstance(place, dict) else place[path[-1]]
         if isinstance(value, dict):
             for key in value:
                 lower((*path, key), factor)
@@ -650,7 +651,7 @@ def forged(effort: dict[str, Any]) -> list[tuple[tuple[str | int, ...], Any]]:
 
     for name in ABOVE:
         path = tuple(name.split("."))
-        if effort[path[0]] is not None:
+        if path[0] in effort:
             lower(path)
     for k, constants in enumerate(effort["constants"]):
         if constants is not None:

@@ -157,7 +157,7 @@ def test_weights_known_to_a_part_leave_the_mean_nearly_kept():
     for _ in range(5):
         assert low - 1e-6 <= end_of_a_signal(rng, family, x)[0] <= high + 1e-6
     data = certificate.to_dict()
-    data["lyapunov"]["functions"][0]["means"][0]["constant"] = "0"
+    data["decays"][0]["means"][0]["constant"] = "0"
     assert "of an input or a mean" in str(answer(data))
 
 
@@ -181,7 +181,7 @@ def test_a_mean_is_of_agents_of_one_group(mean: dict[str, Any], why: str | None)
     """1 and 2 lead, 3 hears both, 4 hears 1."""
     family = Family.from_intervals([(1, 3, 1, 1), (2, 3, 1, 1), (1, 4, 1, 2)])
     data = certify_family(family, PROTOCOL, [1, 2, 3, 4]).to_dict()
-    data["lyapunov"]["functions"][0]["means"] = [mean]
+    data["decays"][0]["means"] = [mean]
     found = answer(data)
     assert found is None if why is None else why in str(found)
 
@@ -220,12 +220,14 @@ def test_a_mean_that_is_not_kept_is_refused():
         ([{"2": "equal"}], "means of a component"),
         ([], "not enclosed"),
         ([None], "not enclosed"),
-        (None, "not enclosed"),
+        (None, "witness is null, and not left out"),
         ({"1": "equal"}, "not a list"),
         ([["equal"]], "numbers as keys"),
     ):
         step["witness"] = witness
         assert why in str(answer(data)), witness
+    del step["witness"]
+    assert "not enclosed" in str(answer(data))
 
 
 def test_a_mean_that_an_uncertain_edge_changes_is_refused():

@@ -141,12 +141,19 @@ def less(rows: list[Any], i: int) -> list[Any]:
         (lambda rows: [[None, *rows[0]]], ""),
         (lambda rows: [rows[0]] * 17, "more than 16"),
         (lambda rows: [], "no instants"),
-        (lambda rows: None, ""),
+        (lambda rows: None, "instants is null, and not left out"),
     ],
 )
 def test_forged_instants_are_rejected(change: Callable[[list[Any]], Any], reason: str, kind: str):
     report = check(changed(change, kind))
     assert not report.accepted and reason in (report.reason or "")
+
+
+@pytest.mark.parametrize("kind", ["at rest", "cascade"])
+def test_instants_that_are_not_told_are_not_proved(kind: str):
+    document = {key: part for key, part in made("camps", kind).to_dict().items() if key != "instants"}
+    report = check(resealed(document))
+    assert not report.accepted and report.rejected != "digest"
 
 
 @every(3)

@@ -302,13 +302,13 @@ def in_places() -> Certificate:
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
-        (None, "formation"),
+        (None, "formation is null, and not left out"),
         ({"offsets": {"a": "1"}}, "missing"),
         ({"offsets": {"a": "1", "b": "-3", "c": "2", "d": "nan"}}, ""),
         ({"offsets": {"a": "1", "b": "-3", "c": "2", "d": "3"}}, "an agent of the formation begins elsewhere"),
         ({"initial_state": {"a": "5", "b": "2", "c": "4", "d": "-2"}}, "an agent of the formation begins elsewhere"),
-        ({"initial_state": None}, "positions are told iff states are"),
-        ({"final_state": None}, "positions are told iff states are"),
+        ({"initial_state": None}, "initial_state is null, and not left out"),
+        ({"final_state": None}, "final_state is null, and not left out"),
         (
             {"final_state": {"a": "4.5", "b": "0.5", "c": "5.5", "d": "-1.5"}},
             "an agent of the formation ends elsewhere",
@@ -320,6 +320,14 @@ def test_places_and_positions_that_do_not_follow_are_rejected(change: Any, reaso
     assert check(data).accepted
     report = check({**data, "formation": change and {**data["formation"], **change}})
     assert not report.accepted and reason in (report.reason or "")
+
+
+@pytest.mark.parametrize("key", ["initial_state", "final_state"])
+def test_places_without_positions_are_rejected_where_states_are_told(key: str):
+    data = in_places().to_dict()
+    formation = {k: part for k, part in data["formation"].items() if k != key}
+    assert check({**data, "formation": formation}).reason == "positions are told iff states are"
+    assert not check({k: part for k, part in data.items() if k != "formation"}).accepted
 
 
 def test_no_agents_of_order_n_stand_beside_a_formation():

@@ -190,7 +190,7 @@ def test_no_other_number_of_a_final_value_is_accepted_unless_it_is_true():
         (("component",), 1, "an unknown component"),
         (("modes",), [None], "no final value of any mode"),
         (("modes",), [], "modes has not 1 entries"),
-        (("modes", 0, "above"), None, "above is not an object"),
+        (("modes", 0, "above"), None, "above is null, and not left out"),
         (("modes", 0, "above"), {"a": "0"}, 'the key "b" is missing'),
         (("modes", 0, "above"), {"b": "0", "a": "0"}, "agents are in another order"),
         (("modes", 0, "below"), {"a": "0", "b": "0", "c": "0"}, 'the key "c" is not known'),
@@ -202,6 +202,14 @@ def test_what_does_not_fit_is_rejected(path: tuple[Any, ...], new: Any, reason: 
     data = pair().to_dict()
     assert check(data).accepted
     assert check(resealed(changed(data, ("restricted", 1, *path), new))).reason == reason
+
+
+@pytest.mark.parametrize("key", ["above", "below"])
+def test_both_vectors_are_told(key: str):
+    data = pair().to_dict()
+    bare = {k: value for k, value in data["restricted"][1]["modes"][0].items() if k != key}
+    report = check(resealed(changed(data, ("restricted", 1, "modes", 0), bare)))
+    assert report.reason == f"{key} is not an object"
 
 
 def test_optional_edges_count_for_who_decides():

@@ -111,7 +111,7 @@ def times(factor: Any) -> Callable[[str], str]:
         (("phases",), lambda entries: entries[::-1], ""),
         (("phases",), lambda entries: entries[:-1], "lists another obligation"),
         (("phases",), lambda entries: [*entries, entries[-1]], "lists another obligation"),
-        (("phases",), lambda _: None, ""),
+        (("phases",), lambda _: None, "phases is null, and not left out"),
     ],
 )
 def test_forged_phases_are_rejected(path: tuple[Any, ...], change: Callable[[Any], Any], reason: str):
@@ -119,6 +119,12 @@ def test_forged_phases_are_rejected(path: tuple[Any, ...], change: Callable[[Any
         path = ("phases", len(made("order 4").to_dict()["phases"]) - 1, *path[2:])
     report = check(changed(path, change))
     assert not report.accepted and reason in (report.reason or "")
+
+
+def test_phases_that_are_not_told_are_not_proved():
+    document = {key: part for key, part in made("order 4").to_dict().items() if key != "phases"}
+    report = check(resealed(document))
+    assert not report.accepted and report.rejected != "digest"
 
 
 def test_phases_stand_beside_agents_of_order_n_without_a_cap_alone():

@@ -93,13 +93,11 @@ def rejected(data: Json, where: str) -> None:
 @pytest.mark.parametrize("name", ["2.1 K>=2", "2.2", "3.1 mixed", "3.2", "3.1 all single"])
 def test_false_rates_and_narrow_intervals_are_rejected(name: str):
     _, data = made(name, 5)
-    for k, function in enumerate(data["lyapunov"]["functions"]):
-        of = f"lyapunov.functions[{k}]"
+    for k, function in enumerate(data["decays"]):
+        of = f"decays[{k}]"
         step = next(i for i, s in enumerate(data["proof"]) if s["of"] == of and s["kind"] == "dominance")
         higher = str(Fraction(function["rate"]) * (1 + Fraction(1, 10**6)))
-        forged = changed(
-            changed(data, ("lyapunov", "functions", k, "rate"), higher), ("proof", step, "numbers"), {"b": higher}
-        )
+        forged = changed(changed(data, ("decays", k, "rate"), higher), ("proof", step, "numbers"), {"b": higher})
         rejected(forged, f"dominance of {of}")
         vector = data["proof"][step]["witness"]["vector"]
         for new in (f"-{vector[0]}", "0"):
@@ -107,18 +105,20 @@ def test_false_rates_and_narrow_intervals_are_rejected(name: str):
         for i, g in enumerate(data["proof"][step]["witness"]["groups"]):
             more = str(Fraction(g) * (1 + Fraction(1, 10**6)))
             rejected(changed(data, ("proof", step, "witness", "groups", i), more), f"dominance of {of}")
-    for label in data["structure"]["followers"]:
+    for label in data["structure"][0]["followers"]:
         ball = data["final_state"][label]
         if isinstance(ball, str):  # nobody is followed but groups that end at 0
             rejected(changed(data, ("final_state", label), "1e-30"), "final-state of graph")
             continue
         for new in ({**ball, "radius": "1e-300"}, {**ball, "mid": str(float(ball["mid"]) + 1e-6)}):
             rejected(changed(data, ("final_state", label), new), "final-state of graph")
-    leader = data["structure"]["leaders"][0]
+    leader = data["structure"][0]["leaders"][0]
     rejected(changed(data, ("final_state", leader), "7/3"), "final-state of graph")
     at = next(i for i, s in enumerate(data["proof"]) if s["kind"] == "final-state")
-    if any(isinstance(data["final_state"][label], dict) for label in data["structure"]["followers"]):
+    if any(isinstance(data["final_state"][label], dict) for label in data["structure"][0]["followers"]):
         rejected(changed(data, ("proof", at, "witness"), None), "final-state of graph")
+        bare = {key: x for key, x in data["proof"][at].items() if key != "witness"}
+        rejected(changed(data, ("proof", at), bare), "final-state of graph")
 
 
 def random_sparse(n: int, seed: int) -> SignedDigraph:
@@ -247,6 +247,7 @@ def test_forged_rates_of_large_groups_are_rejected(balanced: bool):
             rejected(changed(data, (*where, "factor", key), new), "dominance of")
     rejected(changed(data, (*where, "factor", "bits"), said["factor"]["bits"] + 1), "dominance of")
     rejected(changed(data, (*where, "factor"), None), "dominance of")
+    rejected(changed(data, where, {key: x for key, x in said.items() if key != "factor"}), "dominance of")
     rejected(changed(data, where, said["rate"] + "0"), "dominance of")
     if balanced:
         null_vector = data["influence"]["components"][0]["left_null_vector"][5]
@@ -476,13 +477,16 @@ def test_a_forged_tree_is_rejected():
     data = json.loads(certify(SLOW["directed ring"], NOMINAL, asks=Asks(simulation=False, method="perron")).to_json())
     step = next(i for i, s in enumerate(data["proof"]) if s["kind"] == "dominance")
     where = ("proof", step, "witness", "groups", 0, "factor", "parents")
-    tree = data["proof"][step]["witness"]["groups"][0]["factor"]["parents"]
+    factor = data["proof"][step]["witness"]["groups"][0]["factor"]
+    tree = factor["parents"]
     root = tree.index(-1)
     two = [-1 if i == (root + 1) % 300 else q for i, q in enumerate(tree)]
     loop = [(i + 1) % 300 for i in range(300)]
     for new in (None, tree[:-1], two, loop, [300, *tree[1:]], [*loop[:-1], -2], [0, *tree[1:]]):
         rejected(changed(data, where, new), "dominance of")
-    weights = ("lyapunov", "functions", 0, "blocks", 0, "diagonal", 0)
+    bare = {key: x for key, x in factor.items() if key != "parents"}
+    rejected(changed(data, where[:-1], bare), "dominance of")
+    weights = ("decays", 0, "blocks", 0, "diagonal", 0)
     rejected(changed(data, weights, "0.9"), "dominance of")
 
 

@@ -299,6 +299,10 @@ def test_no_claim_is_larger_than_its_proof():
         made = copy.deepcopy(data)
         made["restricted"][0][key] = new
         assert not check(resealed(made)).accepted, (key, new)
+    for key in entry:
+        made = copy.deepcopy(data)
+        del made["restricted"][0][key]
+        assert not check(resealed(made)).accepted, key
     longer = copy.deepcopy(data)
     longer["restricted"][0]["signals"]["dwell"] = str(2 * ON_CLOCK.least)
     assert check(resealed(longer)).accepted
@@ -536,7 +540,7 @@ def test_what_shares_prove_is_judged_and_read_back(tmp_path: Path):
         ("rate", str(made.restricted[0].rate + Fraction(1, 1000))),
         ("behaviour", "stability"),
         ("behaviour", None),
-        ("nodes", data["graph"]["nodes"]),
+        ("nodes", data["problem"]["graph"]["nodes"]),
         ("signals", {"shares": ["1", "0.1", "0"]}),
         ("signals", {"shares": ["1.5", "-0.5", "0"]}),
         ("signals", {"shares": ["1", "0"]}),
@@ -544,6 +548,9 @@ def test_what_shares_prove_is_judged_and_read_back(tmp_path: Path):
         forged = copy.deepcopy(data)
         forged["restricted"][0][key] = new
         assert not check(resealed(forged)).accepted, (key, new)
+    forged = copy.deepcopy(data)
+    del forged["restricted"][0]["behaviour"]
+    assert not check(resealed(forged)).accepted
 
 
 def played_by_shares(family: Family, shares: list[Fraction], x: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -625,13 +632,24 @@ def test_no_end_that_shares_do_not_prove_is_accepted(tmp_path: Path):
         ({"a": "2", "b": "2"}, {"mean": {"a": "1", "b": "3"}, "more": 1}, False),
     ):
         forged = copy.deepcopy(data)
-        forged["restricted"][0]["final_state"], forged["proof"][step]["witness"] = ends, witness
+        for place, key, new in (
+            (forged["restricted"][0], "final_state", ends),
+            (forged["proof"][step], "witness", witness),
+        ):
+            place.pop(key)
+            place |= {} if new is None else {key: new}
         assert check(resealed(forged)).accepted is accepted, (ends, witness)
     older = copy.deepcopy(data)  # files that were made before say nothing of ends
     del older["restricted"][0]["final_state"]
     assert not check(resealed(older)).accepted
     older["proof"][step]["witness"] = None
+    assert not check(resealed(older)).accepted
+    del older["proof"][step]["witness"]
     assert check(resealed(older)).accepted
+    for place, key in (("restricted", "final_state"), ("proof", "witness")):
+        null = copy.deepcopy(data)
+        null[place][step if place == "proof" else 0][key] = None
+        assert not check(resealed(null)).accepted, key
     stable = certify_family(
         Family.switching([day, outage]), PROTOCOL, [8, 0], signal=ClockShares(["0.5", "0.5"])
     ).to_dict()

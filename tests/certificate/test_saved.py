@@ -147,7 +147,7 @@ def test_the_bound_is_never_below_what_the_exact_numbers_say(name: str, tmp_path
     p, L = saved.protocol, saved.graph.exact_laplacian()
     n, start = len(L), saved.initial_state or ()
     E = [-sum(L[i][j] * start[j] for j in range(n)) for i in range(n)]
-    for k, said in enumerate(saved.document["lyapunov"]["functions"]):
+    for k, said in enumerate(saved.document["decays"]):
         alone = replace(saved.envelope, functions=saved.envelope.functions[k : k + 1])
         rate, where = Fraction(said["rate"]), []
         V, lowest = Fraction(0), None
@@ -161,7 +161,7 @@ def test_the_bound_is_never_below_what_the_exact_numbers_say(name: str, tmp_path
                     for j, x in enumerate(row)
                 )
                 steps = {(s["kind"], s["of"]): s for s in saved.document["proof"]}
-                lowest = Fraction(steps["overshoot", f"lyapunov.functions[{k}]"]["numbers"]["lowest"])
+                lowest = Fraction(steps["overshoot", f"decays[{k}]"]["numbers"]["lowest"])
                 continue
             rho = Fraction(said["rho"]) if block["times_rho"] else 1
             weights = [Fraction(x) * rho for x in block["diagonal"]]
@@ -269,7 +269,11 @@ def test_a_disturbance_that_is_no_expression_within_delta_gives_way_to_the_worst
         tmp_path / "c.json"
     )
     data = json.loads((tmp_path / "c.json").read_text())
-    data["protocol"]["disturbance"] = said
+    gain = data["problem"]["gain"]
+    assert "disturbance" not in gain
+    null = {**data, "problem": {**data["problem"], "gain": {**gain, "disturbance": None}}}
+    assert ptcc.check({**null, "digest": digest(null)}).reason == "disturbance is null, and not left out"
+    gain |= {} if said is None else {"disturbance": said}
     data["digest"] = digest(data)
     (tmp_path / "c.json").write_text(json.dumps(data))
     saved = read_certificate(tmp_path / "c.json").with_simulation()
@@ -315,10 +319,11 @@ def replace_final_state(made: ptcc.Certificate, folder: Path) -> Certificate:
     """Take the outcome out of a certificate: what is left proves the decay, and decides nothing."""
     made.save(folder / "c.json")
     data = json.loads((folder / "c.json").read_text())
-    data |= {"influence": None, "final_state": None, "verdict": "undecided"}
+    del data["influence"], data["final_state"]
+    data["verdict"] = "undecided"
     data["proof"] = [s for s in data["proof"] if s["kind"] not in ("final-state", "deviation")]
-    for function in data["lyapunov"]["functions"]:
-        function["deviation"] = None
+    for function in data["decays"]:
+        del function["deviation"]
     data["digest"] = digest(data)
     (folder / "c.json").write_text(json.dumps(data))
     return read_certificate(folder / "c.json")

@@ -23,7 +23,7 @@ from agent_documents import Setting, damping_bound, document, final_state, oblig
 from asked import certify_family, certify_words
 from cpu_time import at_most
 from generators import all_classes, random_graph
-from mutations import Json, at, changed, judged_mutants, mutants, nudged, resealed
+from mutations import Json, at, changed, judged_mutants, mutants, nudged, part_of, resealed
 from oracle_agents import false_claims_of_agents
 from schema_validator import VALIDATOR
 
@@ -79,8 +79,9 @@ def accepted(data: Json) -> None:
 
 
 def with_agents(data: Json, **parts: Any) -> Json:
-    """The same with other parts of ``agents``, and the obligations that belong to them."""
-    data = {**data, "agents": {**data["agents"], **parts}}
+    """The same with other parts of ``agents``, None: left out, and the obligations that belong to them."""
+    told = {**data["agents"], **parts}
+    data = {**data, "agents": {key: x for key, x in told.items() if x is not None}}
     own = obligations(data["agents"])
     of_graph = [s for s in data["proof"] if s["of"] != "agents" and s["kind"] != "input-constants"]
     return resealed({**data, "proof": [*of_graph, *own]})
@@ -101,7 +102,7 @@ LARGE = {"agents": dict.fromkeys("abcf", "10000000"), "largest": "10000000"}
 
 def undamped(data: Json) -> Json:
     """Its input as far as it is of relative positions and velocities."""
-    less, labels = damping_bound(data, SETTINGS["at rest"]) or [], data["graph"]["nodes"]
+    less, labels = damping_bound(data, SETTINGS["at rest"]) or [], data["problem"]["graph"]["nodes"]
     rest = {label: str(F(data["agents"]["input"]["agents"][label]) - x) for label, x in zip(labels, less, strict=True)}
     return {"agents": rest, "largest": max(rest.values(), key=F)}
 
@@ -140,11 +141,11 @@ def test_unbalanced_groups_and_single_leaders_are_accepted_and_true(kind: str):
 def test_disconnected_graphs_and_single_nodes_are_accepted_and_true():
     parts = graph_of([*CAMPS, ("p", "q", -1), ("q", "p", -1)])
     data = document(parts, PLAIN)
-    assert data["claim"] is None
+    assert "claim" not in data
     accepted(data)
     assert false_claims_of_agents(data) == []
     alone = document(SignedDigraph.from_edges([], ["only"]), Setting(plant=(F(1), F(0))))
-    assert alone["agents"]["functions"] == [] and alone["agents"]["final_state"] is not None
+    assert alone["agents"]["functions"] == [] and "final_state" in alone["agents"]
     accepted(alone)
     assert alone["verdict"] == "certified" and false_claims_of_agents(alone) == []
 
@@ -164,9 +165,9 @@ def test_the_meeting_in_flight_of_the_theory():
 def test_rates_down_to_the_limit_are_accepted():
     slow = document(graph_of(CAMPS), replace(PLAIN, R=F(2001, 1000)))
     accepted(slow)
-    assert slow["agents"]["input"] is None and false_claims_of_agents(slow) == []
+    assert "input" not in slow["agents"] and false_claims_of_agents(slow) == []
     edge = document(graph_of(CAMPS), replace(PLAIN, R=F(4)))
-    assert edge["agents"]["input"] is not None
+    assert "input" in edge["agents"]
     accepted(edge)
 
 
@@ -263,7 +264,7 @@ def part_of_motion(i: int, j: int, new: Any) -> Change:
 
 
 def used(*entries: Any) -> Change:
-    return agents(functions=[{"function": k, "inputs": None} for k in entries])
+    return agents(functions=[{"function": k} for k in entries])
 
 
 def proof_without_the_last(data: Json) -> Json:
@@ -450,37 +451,44 @@ def test_a_wrong_one_stays_wrong_in_the_eyes_of_the_oracle():
 
 def test_sliding_variables_that_begin_elsewhere_are_refused():
     data = made("sliding variables")
-    sigma = dict.fromkeys(data["graph"]["nodes"], "0") | {"a": "1/1000"}
-    z = {**data["reaching_time"], "z": dict.fromkeys(data["graph"]["nodes"])}
-    rejected(
-        {**data, "sliding_variable": sigma, "reaching_time": z}, "sliding_variable", "sliding variables that are 0"
-    )
+    sigma = dict.fromkeys(data["problem"]["graph"]["nodes"], "0") | {"a": "1/1000"}
+    z = {**data["reaching_time"], "z": dict.fromkeys(data["problem"]["graph"]["nodes"])}
+    moving = changed({**data, "reaching_time": z}, ("problem", "sliding_variable"), sigma)
+    rejected(moving, "sliding_variable", "sliding variables that are 0")
 
 
 def test_parts_of_agents_of_order_1_are_empty():
     data, zero = made(), dict.fromkeys("abcf", "0")
-    rejected({**data, "initial_state": zero}, "final_state|final-state|initial_state", "")
+    rejected(changed(data, ("problem", "initial_state"), zero), "final_state|final-state|initial_state", "")
     plain = json.loads(certify(graph_of(CAMPS), NominalProtocol(T=2, rho1="1/2", rho2="3/4", kappa=2)).to_json())
     rejected({**data, "input": plain["input"]}, "input", "beside that of the agents")
     rejected({**data, "agents": None}, "format", "agents is null")
     rejected({**plain, "agents": data["agents"]}, "initial_state|input", "beside that of the agents")
     rejected({**data, "agents": {**data["agents"], "more": None}}, "agents", "not known")
-    rejected(with_agents({key: x for key, x in data.items() if key != "input"}), "format", "missing")
+    rejected({**data, "input": None}, "format", "input is null, and not left out")
+    rejected(with_agents({key: x for key, x in data.items() if key != "rates"}), "format", "missing")
+
+
+def test_parts_that_are_null_are_rejected():
+    data = made("capped later")
+    for key in ("gain_cap", "initial_state", "final_state", "residual", "input"):
+        rejected(changed(data, ("agents", key), None), "agents", f"{key} is null, and not left out")
+    rejected(changed(data, ("agents", "functions", 0, "inputs"), None), "agents", "inputs is null, and not left out")
 
 
 def test_only_agents_of_order_n_may_do_without_rho1():
     data = made("no rho1")
     plain = {key: x for key, x in data.items() if key != "agents"}
-    rejected(plain, "protocol", "not positive")
-    rejected(changed(data, ("protocol", "rho1"), "-1/100"), "protocol", "rho1 is negative")
-    rejected(changed(data, ("protocol", "rho2"), "0"), "protocol", "not positive")
+    rejected(plain, "gain", "not positive")
+    rejected(changed(data, ("problem", "gain", "rho1"), "-1/100"), "gain", "rho1 is negative")
+    rejected(changed(data, ("problem", "gain", "rho2"), "0"), "gain", "not positive")
 
 
 def test_agents_of_order_n_on_a_family_are_refused():
     one = Family.switching([graph_of(CAMPS), graph_of([*CAMPS[:-1], ("a", "f", 1)])])
     data = json.loads(certify_family(one, NominalProtocol(T=2, rho1="1/2", rho2="3/4", kappa=2)).to_json())
     assert check(data).accepted
-    rejected({**data, "agents": made()["agents"]}, "protocol|format", "has no place for a family")
+    rejected({**data, "agents": made()["agents"]}, "format", "has no place for a family")
 
 
 def test_an_undecided_certificate_says_nothing_of_the_end():
@@ -504,8 +512,8 @@ def test_nothing_takes_long(monkeypatch: pytest.MonkeyPatch):
         **made()["agents"], "order": 8, "plant": [str(F(big) / (i + 1)) for i in range(8)], "own": ["0"] * 8,
         "gains": [big] * 8, "coupling": big, "lower_triangle": triangle, "rate": "100", "points": points,
         "offsets": {key: ["0"] for key in "abcf"}, "initial_state": small, "motion": [["0"] * 8] * 8,
-        "final_state": None, "input": None,
     }  # fmt: skip
+    told = {key: x for key, x in told.items() if key not in ("final_state", "input")}
     with at_most(15):
         report = check(resealed({**base, "agents": told, "proof": [*base["proof"], *obligations(told)]}))
     assert not report.accepted, (report.rejected, report.reason)
@@ -522,13 +530,13 @@ def told_again(mutant: Json, path: Any, new: str) -> Json:
     """The proof tells some numbers once more."""
     for k, stated in enumerate(mutant["proof"]):
         for key in ("rate", "coupling"):
-            if stated["of"] == "agents" and key in stated["numbers"] and path == ("agents", key):
+            if stated["of"] == "agents" and key in stated.get("numbers", {}) and path == ("agents", key):
                 mutant = changed(mutant, ("proof", k, "numbers", key), new)
     return mutant
 
 
 def nudges(data: Json, seed: int, count: int) -> Iterator[tuple[Any, Json]]:
-    return nudged(data, ("agents", "protocol", "graph", "lyapunov"), seed, count, told_again)
+    return nudged(data, ("agents", "gain", "graph", "decays"), seed, count, told_again)
 
 
 def test_mutants_of_agents_that_are_accepted_are_true():
@@ -545,7 +553,7 @@ def test_mutants_of_every_kind_of_agents_that_are_accepted_are_true(name: str):
     total, passed = 0, Counter[str]()
     for kind in ("camps", "singles"):
         data = made(name, kind)
-        own = ((path, x) for path, x in mutants(data, 3, 1) if path[0] in ("agents", "protocol", "proof", "verdict"))
+        own = ((path, x) for path, x in mutants(data, 3, 1) if part_of(path) in ("agents", "gain", "proof", "verdict"))
         for changes in (own, nudges(data, len(name), int(os.environ.get("PTCC_FUZZ_COUNT", "60")))):
             count, through = judged(data, changes)
             total, passed = total + count, passed + through
@@ -591,7 +599,7 @@ def test_what_the_program_makes_is_true_and_stays_so(seed: int):
     assert data["verdict"] == "certified" and VALIDATOR.is_valid(data)
     accepted(data)
     assert false_claims_of_agents(data) == []
-    own = ((path, x) for path, x in mutants(data, 29, seed) if path[0] in ("agents", "protocol", "proof"))
+    own = ((path, x) for path, x in mutants(data, 29, seed) if part_of(path) in ("agents", "gain", "proof"))
     for changes in (own, nudges(data, seed, 20)):
         judged(data, changes)
 

@@ -21,7 +21,21 @@ from asked import certify_family, family_certificate
 from common_kernel_families import random_family as with_common_kernel
 from cpu_time import at_most
 from families import KINDS, random_family
-from mutations import Json, at, changed, containers, leaves, of_container, of_leaf, resealed, same_claim
+from mutations import (
+    GRAPH,
+    Json,
+    at,
+    changed,
+    containers,
+    leaves,
+    of_container,
+    of_keys,
+    of_leaf,
+    part_of,
+    resealed,
+    same_claim,
+    without,
+)
 from oracle_family_certificates import FamilyOracle, false_family_claims
 from schema_validator import VALIDATOR
 from selection import thinned
@@ -248,13 +262,11 @@ def sliding_cases(count: int) -> list[tuple[str, Json]]:
 
 
 def test_there_are_certificates_of_every_behaviour():
-    claims = [
-        data["claim"] or component["claim"] for _, data in cases() for component in data.get("components", [{}])[:1]
-    ]
-    behaviours = {claim["behaviour"] for claim in claims if claim}
+    claims = [part["claim"] for _, data in cases() for part in data.get("components", [data])[:1]]
+    behaviours = {claim["behaviour"] for claim in claims}
     assert len(cases()) >= 20 and len(behaviours) == 5
-    assert any(data["input"]["peaks"] for _, data in cases()) and any(
-        not data["input"]["bounded"] for _, data in cases()
+    assert any("peaks" in data["input"] for _, data in cases()) and any(
+        "bounded" not in data["input"] for _, data in cases()
     )
     witnesses = [x["witness"] for _, data in cases() for x in data["proof"] if x["kind"] == "family-claim"]
     assert any(w and "rows" in w for some in witnesses for w in some)
@@ -310,25 +322,25 @@ def a_leaf(rng: Rng, data: Json) -> Json:
     path, value = pick(rng, list(leaves(data)))
     if fraction(value) is not None and rng.random() < 0.7:
         return changed(data, path, nudged(rng, value))
-    new = of_leaf(value, data["graph"]["nodes"], False)
+    new = of_leaf(value, data["problem"]["graph"]["nodes"], False)
     return changed(data, path, pick(rng, new)) if new else data
 
 
 def everywhere(rng: Rng, data: Json) -> Json:
-    texts = [v for path, v in leaves(data) if fraction(v) is not None and path[0] != "graph"]
+    texts = [v for path, v in leaves(data) if fraction(v) is not None and path[:2] != GRAPH]
     if not texts:
         return data
     old = pick(rng, texts)
     new = nudged(rng, old)
     for path, value in list(leaves(data)):
-        if value == old and path[0] != "graph":
+        if value == old and path[:2] != GRAPH:
             data = changed(data, path, new)
     return data
 
 
 def a_container(rng: Rng, data: Json) -> Json:
-    path = pick(rng, [p for p in containers(data) if p])
-    new = of_container(at(data, path))
+    path = pick(rng, list(containers(data)))
+    new = [*(of_container(at(data, path)) if path else ()), *(section for _, section in of_keys(at(data, path)))]
     return changed(data, path, pick(rng, new)) if new else data
 
 
@@ -348,11 +360,11 @@ def a_graft(rng: Rng, data: Json) -> Json:
 
 def an_edge(rng: Rng, data: Json) -> Json:
     """Another family with the same claims: an edge less, more, of another sign, narrower, wider, tied or not."""
-    modes = copy.deepcopy(data["graph"]["modes"])
+    modes = copy.deepcopy(data["problem"]["graph"]["modes"])
     mode, way = pick(rng, modes), int(rng.integers(8))
     edges = mode["edges"]
     if way == 7 or not edges:
-        mode["undirected"] = not mode["undirected"]
+        mode |= {} if mode.pop("undirected", False) else {"undirected": True}
     else:
         row = pick(rng, edges)
         ends = [Fraction(row[2]), Fraction(row[-1])]
@@ -370,21 +382,20 @@ def an_edge(rng: Rng, data: Json) -> Json:
         elif way == 5:
             row[0], row[1] = row[1], row[0]
         else:
-            edges.append([*rng.choice(data["graph"]["nodes"], 2).tolist(), "1"])
+            edges.append([*rng.choice(data["problem"]["graph"]["nodes"], 2).tolist(), "1"])
         row[2:] = [str(x) for x in dict.fromkeys(ends)]
-    return with_hash(changed(data, ("graph", "modes"), modes))
+    return with_hash(changed(data, ("problem", "graph", "modes"), modes))
 
 
 def with_hash(data: Json) -> Json:
     """The same with edges in order and the SHA-256 of the modes as the oracle forms it."""
-    index = {label: v for v, label in enumerate(data["graph"]["nodes"])}
+    index = {label: v for v, label in enumerate(data["problem"]["graph"]["nodes"])}
     modes = [
         {**m, "edges": sorted(m["edges"], key=lambda row: (index[row[1]], index[row[0]], Fraction(row[-1]) > 0))}
-        for m in data["graph"]["modes"]
+        for m in data["problem"]["graph"]["modes"]
     ]
-    graph = {**data["graph"], "modes": modes}
-    oracle = FamilyOracle({**data, "graph": graph}, {})
-    return {**data, "graph": graph | {"sha256": oracle.sha256}}
+    data = changed(data, (*GRAPH, "modes"), modes)
+    return changed(data, (*GRAPH, "sha256"), FamilyOracle(data, {}).sha256)
 
 
 MUTATIONS = [(a_leaf, 0.35), (everywhere, 0.2), (a_container, 0.12), (a_swap, 0.06), (a_graft, 0.07), (an_edge, 0.2)]
@@ -434,7 +445,7 @@ def test_no_mutant_is_accepted_that_is_false():
     assert fuzzed(numbers(60), cases())["accepted"] > 0 or os.environ.get("PTCC_FUZZ_ONLY")
 
 
-NEW = ("sliding_variable", "reaching_time", "protocol", "drives", "input", "final_state")
+NEW = ("sliding_variable", "reaching_time", "gain", "drives", "input", "final_state")
 
 
 def changed_numbers(begin: str, keys: tuple[str, ...], count: int) -> Counter[str]:
@@ -448,7 +459,7 @@ def changed_numbers(begin: str, keys: tuple[str, ...], count: int) -> Counter[st
         made = resealed(changed(data, path, nudged(rng, text)))
         if not same_claim(made, data):
             accepted = check(made).accepted
-            seen[f"{path[0]} {'accepted' if accepted else 'rejected'}"] += 1
+            seen[f"{part_of(path)} {'accepted' if accepted else 'rejected'}"] += 1
             assert not accepted or false_family_claims(made) == [], (name, path, at(made, path))
     return seen
 
@@ -508,15 +519,22 @@ def test_certificates_of_families_are_valid():
 @pytest.mark.parametrize(
     ("path", "new"),
     [
-        (("claim", "signal"), "constant"),
+        (("problem", "signal"), "constant"),
+        (("problem", "signal"), None),
+        (("claim", "signal"), "any"),
         (("claim", "behaviour"), "bipartite"),
-        (("graph", "modes", 0, "undirected"), None),
-        (("graph", "modes", 0, "edges", 0), ["a"]),
-        (("structure", "modes", 0, "connectivity"), "torn"),
-        (("protocol", "kind"), "sliding-mode"),
+        (("problem", "graph", "modes", 0, "undirected"), None),
+        (("problem", "graph", "modes", 0, "undirected"), False),
+        (("problem", "graph", "modes", 0, "name"), None),
+        (("problem", "graph", "modes", 0, "edges", 0), ["a"]),
+        (("structure", 0, "connectivity"), "torn"),
+        (("problem", "gain", "kind"), "sliding-mode"),
         (("paper",), {}),
+        (("rates",), {}),
+        (("drives",), None),
+        (("input", "bounded"), None),
         (("verdict",), "undecided"),
-        (("lyapunov", "functions", 0, "class"), "paper"),
+        (("decays", 0, "class"), "paper"),
         (("proof", -1, "lemma"), "Lemma 1"),
         (("more",), 1),
     ],
@@ -524,16 +542,16 @@ def test_certificates_of_families_are_valid():
 def test_what_does_not_fit_is_neither_valid_nor_accepted(path: tuple[Any, ...], new: Any):
     data = next(data for name, data in cases() if name == "uncertain consensus")
     assert VALIDATOR.is_valid(data) and check(resealed(data)).accepted
-    made = {**data, "more": 1} if path == ("more",) else changed(data, path, new)
+    made = changed(data, path, new)
     assert not VALIDATOR.is_valid(made) and not check(resealed(made)).accepted
 
 
 @pytest.mark.parametrize(
     ("path", "new", "reason"),
     [
-        (("graph", "modes"), [], "no mode"),
-        (("sliding_variable",), {}, "the key"),
-        (("lyapunov",), {"functions": [], "drives": []}, "drives"),
+        (("problem", "graph", "modes"), [], "no mode"),
+        (("problem", "sliding_variable"), {}, "the key"),
+        (("drives",), [], "drives"),
         (("input", "bounded"), False, "no place here"),
         (("proof", 0, "of"), "graph", "another obligation"),
     ],
@@ -562,10 +580,10 @@ def test_an_undirected_family_is_not_the_directed_one_of_the_same_bounds():
     assert slowest < 0.32 < 1.17 < float(made.rate)
     assert tied != free and tied.sha256 != free.sha256
     forged = made.to_dict()
-    forged["graph"]["modes"][0]["undirected"] = False
+    del forged["problem"]["graph"]["modes"][0]["undirected"]
     assert check(resealed(forged)).rejected == "graph"
-    forged["graph"]["sha256"] = free.sha256
-    assert check(resealed(forged)).rejected == "family-rate of lyapunov.functions[0].modes[0]"
+    forged["problem"]["graph"]["sha256"] = free.sha256
+    assert check(resealed(forged)).rejected == "family-rate of decays[0].modes[0]"
 
 
 def forged(name: str, *changes: tuple[tuple[Any, ...], Any]) -> Any:
@@ -582,29 +600,29 @@ def steps(name: str, kind: str) -> list[int]:
 
 def test_a_function_is_of_its_own_component():
     data = next(data for name, data in cases() if name == "two components")
-    numbers = [V["component"] for V in data["lyapunov"]["functions"]]
+    numbers = [V["component"] for V in data["decays"]]
     assert set(numbers) == {0, 1}
     for k, number in enumerate(numbers):
-        path = ("lyapunov", "functions", k, "component")
-        assert forged("two components", (path, 1 - number)).rejected == f"lyapunov.functions[{k}]"
+        path = ("decays", k, "component")
+        assert forged("two components", (path, 1 - number)).rejected == f"decays[{k}]"
         assert not forged("two components", (path, 2)).accepted
 
 
 def test_functions_of_one_component_bound_no_input_of_another():
     data = next(data for name, data in cases() if name == "two components")
     for number in (0, 1):
-        kept = [k for k, V in enumerate(data["lyapunov"]["functions"]) if V["component"] == number]
-        proof = [x for x in data["proof"] if not x["of"].startswith("lyapunov")]
+        kept = [k for k, V in enumerate(data["decays"]) if V["component"] == number]
+        proof = [x for x in data["proof"] if not x["of"].startswith("decays")]
         middle = next(k for k, x in enumerate(proof) if x["kind"] == "family-claim") + 1
         renamed = []
         for place, k in enumerate(kept):
             for x in data["proof"]:
-                if x["of"].startswith(f"lyapunov.functions[{k}]"):
-                    renamed.append({**x, "of": x["of"].replace(f"functions[{k}]", f"functions[{place}]")})
-        functions = [data["lyapunov"]["functions"][k] for k in kept]
+                if x["of"].startswith(f"decays[{k}]"):
+                    renamed.append({**x, "of": x["of"].replace(f"decays[{k}]", f"decays[{place}]")})
+        functions = [data["decays"][k] for k in kept]
         report = forged(
             "two components",
-            (("lyapunov", "functions"), functions),
+            (("decays",), functions),
             (("proof",), proof[:middle] + renamed + proof[middle:]),
         )
         assert not report.accepted and report.rejected in ("family-final-state of final_state", "family-input of input")
@@ -617,20 +635,19 @@ def test_a_multiplier_is_positive_and_none_is_left_out():
     own = at(data, path)
     assert own and forged("uncertain consensus", (path, own)).accepted
     for new in ([], own[:-1], [*own, "1"], ["0", *own[1:]], ["-1", *own[1:]]):
-        assert forged("uncertain consensus", (path, new)).rejected == "family-rate of lyapunov.functions[0].modes[0]"
+        assert forged("uncertain consensus", (path, new)).rejected == "family-rate of decays[0].modes[0]"
     where = ("proof", first, "witness")
-    assert forged("uncertain consensus", (where, None)).reason == "the least weights are not the worst"
+    assert forged("uncertain consensus", (where, None)).reason == "witness is null, and not left out"
+    assert check(resealed(without(data, where))).reason == "the least weights are not the worst"
 
 
 def test_a_peak_takes_a_rate_of_at_least_two_over_the_exponent():
-    name, data = next(
-        (name, data) for name, data in cases() if data["input"]["peaks"] and data["lyapunov"]["functions"]
-    )
-    rate = max(Fraction(V["rate"]) for V in data["lyapunov"]["functions"])
-    exponent = Fraction(data["protocol"]["kappa"]) * Fraction(data["protocol"]["rho2"])
+    name, data = next((name, data) for name, data in cases() if "peaks" in data["input"] and data["decays"])
+    rate = max(Fraction(V["rate"]) for V in data["decays"])
+    exponent = Fraction(data["problem"]["gain"]["kappa"]) * Fraction(data["problem"]["gain"]["rho2"])
     assert rate * exponent >= 2
-    slower = str(Fraction(199, 100) / rate / Fraction(data["protocol"]["rho2"]))
-    assert forged(name, (("protocol", "kappa"), slower)).rejected == "family-input of input"
+    slower = str(Fraction(199, 100) / rate / Fraction(data["problem"]["gain"]["rho2"]))
+    assert forged(name, (("problem", "gain", "kappa"), slower)).rejected == "family-input of input"
 
 
 def test_a_rate_that_is_not_positive_moves_nothing():
@@ -639,15 +656,15 @@ def test_a_rate_that_is_not_positive_moves_nothing():
     data = next(data for own, data in cases() if own == name)
     proof = [x for x in data["proof"] if x["kind"] != "family-input"]
     proof = [{**x, "numbers": {"b": "-1"}} if x["kind"] == "family-rate" else x for x in proof]
-    functions = [{**V, "rate": "-1"} for V in data["lyapunov"]["functions"]]
-    size = max(abs(Fraction(x)) for x in data["initial_state"].values())
+    functions = [{**V, "rate": "-1"} for V in data["decays"]]
+    size = max(abs(Fraction(x)) for x in data["problem"]["initial_state"].values())
     for share, accepted in ((1, True), (Fraction(1, 100), False)):
-        ends = dict.fromkeys(data["graph"]["nodes"], ball("0", str(share * size)))
+        ends = dict.fromkeys(data["problem"]["graph"]["nodes"], ball("0", str(share * size)))
         report = forged(
             name,
             (("proof",), proof),
-            (("lyapunov", "functions"), functions),
-            (("input",), {"bounded": None, "peaks": None}),
+            (("decays",), functions),
+            (("input",), {}),
             (("final_state",), ends),
         )
         assert functions and report.accepted == accepted
@@ -683,9 +700,9 @@ def test_known_weights_are_one_family_whether_undirected_or_not():
 @pytest.mark.parametrize("name", ["connectivity", "balanced", "sign_symmetric"])
 def test_what_is_said_of_a_mode_is_verified(name: str):
     data = next(data for name, data in cases() if name == "leaders change")
-    said = data["structure"]["modes"][0][name]
+    said = data["structure"][0][name]
     new = (not said) if isinstance(said, bool) else "weak"
-    report = check(resealed(changed(data, ("structure", "modes", 0, name), new)))
+    report = check(resealed(changed(data, ("structure", 0, name), new)))
     assert not report.accepted
 
 
@@ -697,7 +714,7 @@ def moved(state: Json, edge: Any = None, modes: tuple[int, int] = (0, 1)) -> Any
     second = [("a", "c", 1, 1), ("b", "c", 3, 3), ("c", "d", 2, 4)]
     data = document(Family.switching([Family.from_intervals(e) for e in (APART, second)]), state=False)
     place = next(k for k, x in enumerate(data["proof"]) if x["kind"] == "family-claim")
-    witness = [{"mode": modes[0], "other": modes[1], "edge": edge, "state": state}]
+    witness = [{"mode": modes[0], "other": modes[1], "state": state} | ({"edge": edge} if edge else {})]
     return check(resealed(changed(data, ("proof", place, "witness"), witness)))
 
 
@@ -751,7 +768,7 @@ def test_the_true_state_lies_within_the_radii():
         mids = [x + draw.randint(-8, 8) * size / 8 for x in (c, d)]
         radii = [draw.randint(1, 8) * size / 8 for _ in (c, d)]
         state = {"a": "1"} | {k: ball(str(m), str(r)) for k, m, r in zip("cd", mids, radii, strict=True)}
-        witness = [{"mode": 0, "other": 1, "edge": None, "state": state}]
+        witness = [{"mode": 0, "other": 1, "state": state}]
         if check(resealed(changed(data, ("proof", place, "witness"), witness))).accepted:
             accepted += 1
             assert all(abs(x - m) <= r for x, m, r in zip((c, d), mids, radii, strict=True))
@@ -771,17 +788,19 @@ def hostile(n: int, edges: list[Any] | None = None, multiplier: str = "1000", mo
     function = {"class": "full", "component": 0, "nodes": labels[1:], "rate": "-100"}
     function["lower_triangle"] = [["1" if i == j else "0" for j in range(i + 1)] for i in range(n)]
     function |= {"inputs": dict.fromkeys(labels, "1000000"), "coordinates": dict.fromkeys(labels[1:], "2")}
-    data["lyapunov"] = {"functions": [function]}
+    data["decays"] = [function]
 
     def step(kind: str, of: str, witness: Any = None, **numbers: str) -> Json:
         proves, lemma = checker.OBLIGATIONS[kind]
-        return {"kind": kind, "of": of, "proves": proves, "lemma": lemma, "numbers": numbers, "witness": witness}
+        told = {"numbers": numbers or None, "witness": witness}
+        brought = {key: x for key, x in told.items() if x is not None}
+        return {"kind": kind, "of": of, "proves": proves, "lemma": lemma, **brought}
 
     proof = data["proof"][: modes + 1]
     multipliers = {"multipliers": [f"{multiplier}{i}" if len(multiplier) > 4 else multiplier for i in range(q)]}
-    proof += [step("family-rate", f"lyapunov.functions[0].modes[{k}]", multipliers, b="-100") for k in range(modes)]
-    data["proof"] = [*proof, step("family-constants", "lyapunov.functions[0]")]
-    data["input"] = {"bounded": None, "peaks": None}
+    proof += [step("family-rate", f"decays[0].modes[{k}]", multipliers, b="-100") for k in range(modes)]
+    data["proof"] = [*proof, step("family-constants", "decays[0]")]
+    data["input"] = {}
     return data
 
 
@@ -792,8 +811,8 @@ def long_numbers(count: int, digits: int = 1900) -> list[str]:
 
 def with_long_state(n: int) -> Json:
     data = hostile(n)
-    labels = data["graph"]["nodes"]
-    data["initial_state"] = dict(zip(labels, long_numbers(n + 1), strict=True))
+    labels = data["problem"]["graph"]["nodes"]
+    data["problem"]["initial_state"] = dict(zip(labels, long_numbers(n + 1), strict=True))
     data["final_state"] = dict.fromkeys(labels, ball("0", "100"))
     data["proof"].append({**data["proof"][-1], "kind": "family-final-state", "of": "final_state"})
     data["proof"][-1]["proves"], data["proof"][-1]["lemma"] = checker.OBLIGATIONS["family-final-state"]
@@ -828,13 +847,13 @@ def with_many_functions(leaders: int, modes: int) -> Json:
     edges = [(f"l{i}", "f", 1, 1) for i in range(leaders)]
     family = Family.switching([Family.from_intervals(edges)] * modes)
     data = document(family, state=False)
-    one = data["lyapunov"]["functions"][0]
+    one = data["decays"][0]
     proof = data["proof"]
-    own = [x for x in proof if x["of"].startswith("lyapunov.functions[0]")]
-    rest = [x for x in proof if not x["of"].startswith("lyapunov")]
+    own = [x for x in proof if x["of"].startswith("decays[0]")]
+    rest = [x for x in proof if not x["of"].startswith("decays")]
     place = next(k for k, x in enumerate(rest) if x["kind"] == "family-claim") + 1
     many = [{**x, "of": x["of"].replace("[0]", f"[{k}]", 1)} for k in range(100) for x in own]
-    return {**data, "lyapunov": {"functions": [one] * 100}, "proof": rest[:place] + many + rest[place:]}
+    return {**data, "decays": [one] * 100, "proof": rest[:place] + many + rest[place:]}
 
 
 @pytest.mark.parametrize(
@@ -879,7 +898,7 @@ def test_functions_of_rows_are_read_back():
     for name, data in cases():
         if name.startswith("rows"):
             saved = read_certificate(resealed(data))
-            assert [V.kind for V in saved.parts[0].functions] == [V["class"] for V in data["lyapunov"]["functions"]]
+            assert [V.kind for V in saved.parts[0].functions] == [V["class"] for V in data["decays"]]
             for told, ends in zip(data["final_state"].values(), saved.final_state, strict=True):
                 middle, radius = (Fraction(told[k]) for k in ("mid", "radius")) if isinstance(told, dict) else (told, 0)
                 middle = Fraction(middle)
@@ -906,17 +925,17 @@ def test_many_edges_are_read_from_side_files(tmp_path: Path, monkeypatch: pytest
     document = json.loads((tmp_path / "c.json").read_text(encoding="utf-8"))
     VALIDATOR.validate(document)
     files = {path.name: path.read_bytes() for path in tmp_path.glob("*.npy")}
-    assert isinstance(document["graph"]["modes"][0]["edges"], dict) and len(files) >= 4
+    assert isinstance(document["problem"]["graph"]["modes"][0]["edges"], dict) and len(files) >= 4
     assert false_family_claims(document, files) == []
     assert all(check(tmp_path / "c.json", stdlib=stdlib).accepted for stdlib in (True, False))
     saved = read_certificate(tmp_path / "c.json")
     assert saved.family == made.family and saved.family.modes[0].edge_interval(0) == made.family.modes[0].edge_interval(
         0
     )
-    largest = document["graph"]["modes"][0]["edges"]["largest"]
+    largest = document["problem"]["graph"]["modes"][0]["edges"]["largest"]
     values = np.load(tmp_path / largest["file"])
     values[0] += 1
     np.save(tmp_path / "other.npy", values)
     other = {"file": "other.npy", "sha256": hashlib.sha256((tmp_path / "other.npy").read_bytes()).hexdigest()}
-    forged = resealed(changed(document, ("graph", "modes", 0, "edges", "largest"), {**largest, **other}))
+    forged = resealed(changed(document, ("problem", "graph", "modes", 0, "edges", "largest"), {**largest, **other}))
     assert check(forged, files=files | {"other.npy": (tmp_path / "other.npy").read_bytes()}).rejected == "graph"

@@ -78,8 +78,8 @@ def test_more_functions_of_followers_are_accepted(kind):
 def test_numbers_that_prove_too_much_are_refused():
     data = document()
     assert check(data).accepted
-    (k,) = [k for k, V in enumerate(data["lyapunov"]["functions"]) if V["class"] == "rows" and V["parts"]]
-    V, of = data["lyapunov"]["functions"][k], ["lyapunov", "functions", k]
+    (k,) = [k for k, V in enumerate(data["decays"]) if V["class"] == "rows" and V["parts"]]
+    V, of = data["decays"][k], ["decays", k]
     part = V["parts"][0]
     assert "rate" in refused([*of, "rate"], str(exact(V["rate"]) * 2))
     assert "positive" in refused([*of, "vector", 0], "0")
@@ -97,7 +97,7 @@ def test_numbers_that_prove_too_much_are_refused():
 def test_a_rate_of_rows_above_the_proved_one_is_refused_in_both_places():
     data = copy.deepcopy(document())
     (step,) = [s for s in data["proof"] if s["kind"] == "family-rows"]
-    (V,) = [V for V in data["lyapunov"]["functions"] if V["class"] == "rows"]
+    (V,) = [V for V in data["decays"] if V["class"] == "rows"]
     rate = exact(V["rate"])
     V["rate"] = step["numbers"]["b"] = str(rate * Fraction(11, 10))
     assert check(resealed(data)).reason == "a row does not decay fast enough"

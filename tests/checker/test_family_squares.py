@@ -16,7 +16,7 @@ from row_families import bounds_of
 
 from ptcc_certify.certificate import family_certification, section_io
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
-from ptcc_certify.certificate.graph_sections import certificate_family, family_sections
+from ptcc_certify.certificate.graph_sections import certificate_family, family_claim_sections, family_section
 from ptcc_certify.certificate.runs_against_bounds import compare
 from ptcc_certify.checker import check
 from ptcc_certify.checker.reading import exact
@@ -83,8 +83,8 @@ def test_sliding_variables_drive_them():
     cert = certify_family(family, protocol, state(n), sigma0=[k % 3 - 1 for k in range(n)])
     assert cert.verdict == "certified" and cert.drives is not None
     data = cert.to_dict()
-    (c,) = data["lyapunov"]["drives"]
-    less = changed(data, ("lyapunov", "drives", 0), str(exact(c) * Fraction(99, 100)))
+    (c,) = data["drives"]
+    less = changed(data, ("drives", 0), str(exact(c) * Fraction(99, 100)))
     assert check(resealed(less)).reason == "what drives the function is not proved"
 
 
@@ -122,8 +122,8 @@ def reason(data: Json) -> str | None:
 
 
 def with_rate(data: Json, factor: Fraction) -> Json:
-    rate = str(exact(data["lyapunov"]["functions"][0]["rate"]) * factor)
-    data = changed(data, ("lyapunov", "functions", 0, "rate"), rate)
+    rate = str(exact(data["decays"][0]["rate"]) * factor)
+    data = changed(data, ("decays", 0, "rate"), rate)
     for k in steps(data):
         data = changed(data, ("proof", k, "numbers", "b"), rate)
     return data
@@ -135,7 +135,7 @@ def test_a_rate_above_the_proved_one_is_refused():
     assert check(data | {"digest": resealed(data)["digest"]}).accepted
     assert reason(with_rate(data, 1 + Fraction(1, 10**4))) == unproved
     assert reason(with_rate(data, Fraction(2))) == unproved
-    once = changed(data, ("lyapunov", "functions", 0, "rate"), "5")
+    once = changed(data, ("decays", 0, "rate"), "5")
     assert reason(once) == "b is not the rate"
 
 
@@ -145,8 +145,8 @@ def test_a_smaller_rate_proves_less():
 
 
 def test_other_vectors_are_refused():
-    data, of = document(), ("lyapunov", "functions", 0, "vector")
-    p = data["lyapunov"]["functions"][0]["vector"]
+    data, of = document(), ("decays", 0, "vector")
+    p = data["decays"][0]["vector"]
     for k in (0, 120):
         for factor in (Fraction(9, 10), Fraction(11, 10)):
             assert reason(changed(data, (*of, k), str(exact(p[k]) * factor)))
@@ -181,14 +181,16 @@ def test_other_factors_are_refused():
 def test_other_weights_of_the_graph_are_refused():
     data = document()
     for k in (0, 600):
-        edges = [list(row) for row in data["graph"]["modes"][0]["edges"]]
+        edges = [list(row) for row in data["problem"]["graph"]["modes"][0]["edges"]]
         ends = list(map(Fraction, edges[k][2:]))
         wide = [end * (1 if end == min(ends, key=abs) else 30) for end in ends]
         edges[k][2:] = list(map(str, wide))
-        modes = [{**data["graph"]["modes"][0], "edges": edges}]
-        family = certificate_family(data["graph"] | {"modes": modes}, {})
-        sections = family_sections(family, decide(family))
-        assert reason({**data, **sections}) == "the rate of a mode is not proved by its factor"
+        modes = [{**data["problem"]["graph"]["modes"][0], "edges": edges}]
+        family = certificate_family(data["problem"]["graph"] | {"modes": modes}, {})
+        out = section_io.Writer(family.labels)
+        sections = family_claim_sections(family, decide(family), out)
+        other = changed({**data, **sections}, ("problem", "graph"), family_section(family, out))
+        assert reason(other) == "the rate of a mode is not proved by its factor"
 
 
 def test_a_sum_of_squares_of_agents_that_agree_is_refused():
@@ -196,7 +198,7 @@ def test_a_sum_of_squares_of_agents_that_agree_is_refused():
     ring = Family.from_intervals([(k, (k + 1) % n, 1, 1) for k in range(n)])
     data = {**certify_family(ring, PROTOCOL).to_dict(), "unverified": {}}
     V = {"class": "squares", "component": 0, "vector": ["1"] * n, "rate": "0"}
-    assert reason(changed(data, ("lyapunov", "functions"), [V])) == "a sum of squares where not all agents end at 0"
+    assert reason(changed(data, ("decays",), [V])) == "a sum of squares where not all agents end at 0"
 
 
 def test_small_families_take_it_where_the_search_finds_nothing_and_else_what_was_found(monkeypatch):

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from generators import KINDS, all_classes, random_graph, smallest
 from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
-from mutations import Json, at, changed, containers, leaves
+from mutations import EDGES, Json, at, changed, containers, leaves, without
 from schema_validator import VALIDATOR
 from selection import thinned
 from side_files import with_factors, with_side_files
@@ -117,17 +117,58 @@ def test_the_schema_is_a_strict_schema():
     sections = {name: found for name, found in SCHEMA["$defs"].items() if "required" in found}
     left_out = {name: set(found["properties"]) - set(found["required"]) for name, found in sections.items()}
     assert {name: keys for name, keys in left_out.items() if keys} == {
-        "GraphCertificate": {"components", "agents", "messages", "formation", "phases", "instants"},
-        "FamilyCertificate": {"components", "boxes", "restricted", "messages"},
-        "Moving": {"sign_gain"},
+        "GraphCertificate": {
+            *("claim", "components", "paper", "overshoot", "influence", "final_state", "reaching_time", "input"),
+            *("agents", "messages", "formation", "phases", "instants"),
+        },
+        "FamilyCertificate": {
+            *("claim", "components", "drives", "final_state", "reaching_time", "boxes", "restricted", "messages"),
+        },
+        "ProblemSection": {"initial_state", "sliding_variable"},
+        "SignalProblem": {"initial_state", "sliding_variable"},
+        "GraphSection": {"read"},
+        "ModeSection": {"name", "undirected"},
         "ReadSection": {"zeros", "laplacian", "columns", "variable"},
+        "SlidingSection": {"disturbance"},
+        "ComponentSection": {"final_state"},
+        "PaperSection": {"rho", "rho_interval", "rate", "overshoot"},
+        "RhoInterval": {"printed", "exact"},
         "BlockSection": {"diagonal", "lower_triangle"},
-        "RowsBound": {"drift", "after"},
-        "MessagesSection": {"vehicles"},
-        "FamilyFunctionsSection": {"drives"},
-        "FamilyInput": {"sliding"},
-        "SharesSection": {"final_state"},
+        "FactorSection": {"weights", "parents"},
+        "FunctionSection": {"rho", "deviation"},
+        "RatesSection": {"paper", "diagonal", "proved", "upper_bound"},
+        "InfluenceSection": {"containment_weights", "degenerate"},
+        "FormationSection": {"initial_state", "final_state"},
+        "InputSection": {"bounded", "initial_set", "peak", "energy", "path_length", "sliding", "disturbed"},
+        "Threshold": {"lower", "upper"},
+        "SlidingPart": {"agents"},
+        "LimitedSection": {"gain_cap", "stop_before", "sample_period", "agents", "largest", "noise"},
+        "DisturbedSection": {"drift"},
+        "FamilyInput": {"bounded", "peaks", "sliding"},
+        "RateSection": {"forms", "bounded"},
+        "LastModeSection": {"final_state"},
+        "WindowsSection": {"final_state"},
+        "SharesSection": {"behaviour", "final_state"},
+        "FinalValue": {"above", "below"},
+        "Counterexample": {"edge"},
+        "AgentsSection": {"gain_cap", "initial_state", "final_state", "residual", "input"},
+        "UsedSection": {"inputs"},
+        "CascadeSection": {"initial_state", "final_state", "input"},
+        "TrackedSection": {"inputs", "initial", "drive"},
+        "MessagesSection": {
+            *("packets", "gain_cap", "leaders", "steps", "residual", "missed", "staged", "settling", "form", "lmi"),
+            *("input", "vehicles"),
+        },
+        "Moving": {"sign_gain"},
+        "RowsBound": {"cap", "clock", "drift", "after"},
+        "VehiclesSection": {"velocity", "input"},
     }
+
+
+def test_no_key_may_be_null():
+    for found in objects(SCHEMA):
+        for key, one in found["properties"].items():
+            assert {"type": "null"} not in one.get("anyOf", [one]), key
 
 
 @pytest.mark.parametrize("path", sorted(CORPUS.glob("*.json")), ids=lambda path: path.stem)
@@ -160,14 +201,14 @@ def test_many_components_and_nothing_proved_are_valid(monkeypatch: pytest.Monkey
     pairs = [(f"a{i}", f"b{i}", -1) for i in range(MANY_COMPONENTS + 5)]
     data = json.loads(certify(SignedDigraph.from_edges(pairs), NOMINAL, asks=Asks(simulation=False)).to_json())
     VALIDATOR.validate(data)
-    assert isinstance(data["components"], dict) and data["influence"]["containment_weights"] is None
+    assert isinstance(data["components"], dict) and "containment_weights" not in data["influence"]
     for key in data["components"]:
         assert not valid(changed(data, ("components", key), {}))
     for module in (vectors, enclosed_ends):
         monkeypatch.setattr(module, "writable", lambda x: 10**60 % x.denominator == 0)
     data = made.__wrapped__("3.1 no single")
     VALIDATOR.validate(data)
-    assert data["proof"][2]["witness"] is not None
+    assert "witness" in data["proof"][2]
 
 
 def test_edges_in_side_files_are_valid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -177,9 +218,9 @@ def test_edges_in_side_files_are_valid(tmp_path: Path, monkeypatch: pytest.Monke
     )
     data = checker.read(tmp_path / "c.json")
     VALIDATOR.validate(data)
-    assert isinstance(data["graph"]["edges"], dict)
-    assert not valid(changed(data, ("graph", "edges", "source", "file"), "../x.npy"))
-    assert not valid(changed(data, ("graph", "edges", "count"), "2"))
+    assert isinstance(at(data, EDGES), dict)
+    assert not valid(changed(data, (*EDGES, "source", "file"), "../x.npy"))
+    assert not valid(changed(data, (*EDGES, "count"), "2"))
 
 
 def test_side_vectors_and_factors_are_valid(monkeypatch: pytest.MonkeyPatch):
@@ -190,11 +231,11 @@ def test_side_vectors_and_factors_are_valid(monkeypatch: pytest.MonkeyPatch):
     assert depth({**data, "unverified": {}}) <= 8
     step = next(k for k, step in enumerate(data["proof"]) if step["kind"] == "dominance")
     for path in (
-        ("structure", "leaders"),
-        ("initial_state",),
+        ("structure", 0, "leaders"),
+        ("problem", "initial_state"),
         ("final_state", "mid"),
         ("proof", step, "witness", "vector"),
-        ("lyapunov", "functions", 0, "blocks", 0, "diagonal"),
+        ("decays", 0, "blocks", 0, "diagonal"),
     ):
         said = at(data, path)
         assert not valid(changed(data, path, {**said, "count": str(said["count"])})), path
@@ -220,7 +261,7 @@ def test_another_key_or_one_less_is_not_valid(samples: tuple[tuple[str, bool], .
 
 def of_one_sample(data: Json, seen: set[Any]) -> int:
     """Change every object of a kind that was not seen; return how many keys were left out."""
-    labels, count = set(data["graph"]["nodes"]), 0
+    labels, count = set(data["problem"]["graph"]["nodes"]), 0
     for path in containers({k: v for k, v in data.items() if k != "unverified"}):
         value = at(data, path)
         if isinstance(value, dict):
@@ -229,17 +270,25 @@ def of_one_sample(data: Json, seen: set[Any]) -> int:
                 continue
             seen.add(one_of_a_kind)
             assert not valid(changed(data, path, {**value, "more": {}})), path
-            # Which agents, whether there is a rho or an end of its interval, and that components are told of a graph
-            # of several, is for the checker.
+            kinds = kinds_of(value)
+            # Which agents, whether there is a rho or an end of its interval, and when a part that may be absent is
+            # there, is for the checker.
             for key in value:
+                assert not kinds or not valid(changed(data, (*path, key), None)), (path, key)
                 if (
-                    (path, key) != ((), "components")
+                    all(key in kind["required"] for kind in kinds)
                     and key not in labels
                     and not (path[-1:] == ("numbers",) and key in ("rho", "printed", "exact"))
                 ):
-                    assert not valid(changed(data, path, {k: v for k, v in value.items() if k != key})), (path, key)
+                    assert not valid(without(data, (*path, key))), (path, key)
                     count += 1
     return count
+
+
+def kinds_of(value: Json) -> list[Json]:
+    """The object schemas that an object fits."""
+    near = [one for one in objects(SCHEMA) if set(one["required"]) <= set(value) <= set(one["properties"])]
+    return [one for one in near if VALIDATOR.evolve(schema=one).is_valid(value)]
 
 
 @pytest.mark.parametrize(("name", "slides"), thinned(SAMPLE[1:] + SAMPLE[:1]))
@@ -284,30 +333,39 @@ def test_the_grammar_of_the_schema_is_that_of_the_checker():
 
 def test_words_and_sections_that_do_not_fit_are_not_valid():
     data, sliding = made("1.1"), made("2.1 K>=2", True)
+    begin = data["problem"]["initial_state"]
     for path, new in (
-        (("schema",), "ptcc-certificate/1"),
+        (("schema",), "ptcc-certificate/2"),
         (("verdict",), "proved"),
         (("input",), "1"),
         (("claim", "theorem"), "7.1"),
         (("claim", "behaviour"), "consensus"),
-        (("structure", "connectivity"), "connected"),
-        (("protocol", "kind"), "sliding-mode"),
-        (("lyapunov", "functions", 0, "class"), "best"),
+        (("structure", 0, "connectivity"), "connected"),
+        (("problem", "gain", "kind"), "sliding-mode"),
+        (("decays", 0, "class"), "best"),
         (("proof", 0, "kind"), "claim"),
         (("proof", 0, "proves"), "everything is well"),
         (("proof", 0, "witness"), {}),
-        (("structure", "closed_components", 0, "gauge", 0), 2),
+        (("structure", 0, "closed_components", 0, "gauge", 0), 2),
+        (("claim",), None),
+        (("problem", "sliding_variable"), None),
+        (("reaching_time",), None),
         (("digest",), data["digest"].upper()),
     ):
         assert not valid(changed(data, path, new)), path
     for whole, reason in (
-        (changed(data, ("structure", "connectivity"), "disconnected"), "the graph is strong"),
-        ({**data, "claim": None}, "the claim is Theorem 1.1"),
+        (changed(data, ("structure", 0, "connectivity"), "disconnected"), "the graph is strong"),
+        ({**data, "structure": data["structure"] * 2}, "structure has not one entry"),
+        (without(data, ("claim",)), "the claim is Theorem 1.1"),
         ({**data, "components": []}, "components of a connected graph"),
         ({**data, "boxes": []}, "boxes has no place for one graph"),
-        ({**data, "sliding_variable": data["initial_state"]}, "sigma(0) belongs to the sliding-mode protocol"),
-        ({**sliding, "sliding_variable": None}, "sigma(0) belongs to the sliding-mode protocol"),
-        ({**sliding, "reaching_time": None}, "reaching times are told iff"),
+        ({**data, "drives": []}, "drives has no place for one graph"),
+        (changed(data, ("problem", "sliding_variable"), begin), "sigma(0) belongs to the sliding-mode protocol"),
+        (without(sliding, ("problem", "sliding_variable")), "sigma(0) belongs to the sliding-mode protocol"),
+        (without(sliding, ("reaching_time",)), "reaching times are told iff"),
+        (changed(data, ("claim",), None), "claim is null, and not left out"),
+        (changed(sliding, ("problem", "sliding_variable"), None), "sliding_variable is null, and not left out"),
+        (changed(sliding, ("reaching_time",), None), "reaching_time is null, and not left out"),
     ):
         assert reason in (check(whole).reason or "")  # what goes with what is for the checker
 
@@ -317,8 +375,12 @@ def test_words_and_sections_that_do_not_fit_are_not_valid():
 
 def test_every_key_is_described():
     rows = set(re.findall(r"^\| `(\w+)` \|", FORMAT.partition("## 4.")[2].partition("## 5.")[0], re.MULTILINE))
-    assert rows - {"boxes", "restricted"} == set(GRAPH["properties"])
-    assert rows - {"agents", "formation", "phases", "instants"} == set(FAMILY["properties"])
+    of_family, of_graph = {"drives", "boxes", "restricted"}, {"paper", "rates", "overshoot", "influence"}
+    assert rows - of_family == set(GRAPH["properties"])
+    assert rows - of_graph - {"agents", "formation", "phases", "instants"} == set(FAMILY["properties"])
+    asked = set(re.findall(r"^\| `(\w+)` \|", FORMAT.partition("## 5.")[2].partition("## 6.")[0], re.MULTILINE))
+    assert asked == set(SCHEMA["$defs"]["SignalProblem"]["properties"])
+    assert asked - {"signal"} == set(SCHEMA["$defs"]["ProblemSection"]["properties"])
     for found in objects(SCHEMA):
         for key in found["properties"]:
             assert re.search(rf"[`\"]{re.escape(key)}[`\"]|`rates\.{key}`|`influence\.{key}`", FORMAT), key
@@ -380,7 +442,7 @@ def test_obligations_stand_in_the_order_of_the_table(name: str, slides: bool):
     table = obligation_table("14")
     groups: list[tuple[str, list[int]]] = []
     for step in made(name, slides, "best")["proof"]:
-        of = step["of"] if step["of"].startswith("lyapunov") else "rest"
+        of = step["of"] if step["of"].startswith("decays") else "rest"
         if not groups or groups[-1][0] != of:
             groups.append((of, []))
         groups[-1][1].append(table.index(step["kind"]))
@@ -409,8 +471,7 @@ def test_the_example_is_the_file_that_is_made_and_is_accepted(tmp_path: Path):
     protocol = NominalProtocol(T="0.6", rho1="0.1", rho2="0.3", kappa=1)
     now = json.loads(certify(graph, protocol, [3, 5], asks=Asks(simulation=False, method="paper")).to_json())
     # Where the search's floats end, and so the last digits of rates and witnesses, is for the platform.
-    exactly = ("schema", "graph", "structure", "claim", "protocol", "initial_state", "sliding_variable", "influence")
-    exactly += ("final_state", "verdict")
+    exactly = ("schema", "problem", "structure", "claim", "influence", "final_state", "verdict")
     assert {key: now[key] for key in exactly} == {key: told[key] for key in exactly}
     assert list(now) == list(told)
     assert [step["kind"] for step in now["proof"]] == [step["kind"] for step in told["proof"]]
@@ -419,14 +480,14 @@ def test_the_example_is_the_file_that_is_made_and_is_accepted(tmp_path: Path):
 def test_the_example_by_hand():
     """The lines below the example."""
     told = example()
-    numbers = {step["kind"]: step["numbers"] for step in told["proof"]}
+    numbers = {step["kind"]: step.get("numbers", {}) for step in told["proof"]}
     assert Fraction(numbers["deviation-decrease"]["b"]) < 4
-    deviation = told["lyapunov"]["functions"][0]["deviation"]
+    deviation = told["decays"][0]["deviation"]
     assert all(Fraction(c) >= 1 for c in deviation["agents"].values()) and Fraction(deviation["norm"]) > 2
     assert numbers["rate-mean"] == {"upper_bound": "4"} and told["rates"]["upper_bound"] == "4"
     lines = ['["1"]', '["2"]', '["1", "2", "-1"]', '["2", "1", "-1"]']
     canonical = "".join(f"{line}\n" for line in lines)
-    assert hashlib.sha256(canonical.encode()).hexdigest() == told["graph"]["sha256"]
+    assert hashlib.sha256(canonical.encode()).hexdigest() == told["problem"]["graph"]["sha256"]
 
 
 def spelled(text: str, ascii_only: bool) -> str:
@@ -464,7 +525,7 @@ def test_both_hashes_are_those_that_the_text_describes():
     assert check(data).accepted
     said = {key: value for key, value in data.items() if key not in ("digest", "unverified")}
     assert hashlib.sha256(written(said).encode("ascii")).hexdigest() == data["digest"]
-    rows = [[label] for label in sorted(data["graph"]["nodes"])]
-    rows += sorted([s, t, str(Fraction(w))] for s, t, w in data["graph"]["edges"])
+    rows = [[label] for label in sorted(data["problem"]["graph"]["nodes"])]
+    rows += sorted([s, t, str(Fraction(w))] for s, t, w in at(data, EDGES))
     text = "".join("[" + ", ".join(spelled(x, False) for x in row) + "]\n" for row in rows)
-    assert hashlib.sha256(text.encode("utf-8")).hexdigest() == data["graph"]["sha256"]
+    assert hashlib.sha256(text.encode("utf-8")).hexdigest() == data["problem"]["graph"]["sha256"]

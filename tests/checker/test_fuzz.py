@@ -100,9 +100,9 @@ def with_limits() -> Json:
 @pytest.mark.parametrize(
     ("path", "share"),
     [
-        (("lyapunov", "functions", 0, "rate"), "1.01"),
-        (("lyapunov", "functions", -1, "deviation", "norm"), "0.5"),
-        (("lyapunov", "functions", -1, "overshoot"), "0.5"),
+        (("decays", 0, "rate"), "1.01"),
+        (("decays", -1, "deviation", "norm"), "0.5"),
+        (("decays", -1, "overshoot"), "0.5"),
         (("rates", "upper_bound"), "0.5"),
         (("rates", "proved"), "1.01"),
         (("input", "threshold", "lower"), "3"),
@@ -113,16 +113,16 @@ def with_limits() -> Json:
         (("input", "residual", 0, "norm"), "1e-6"),
         (("input", "residual", 1, "largest"), "0.01"),
         (("input", "residual", 0, "noise", "norm"), "1e-3"),
-        (("initial_state",), ""),
-        (("graph", "edges"), ""),
+        (("problem", "initial_state"), ""),
+        (("problem", "graph", "modes", 0, "edges"), ""),
     ],
 )
 def test_the_oracle_sees_what_is_false(path: tuple[Any, ...], share: str):
     data = with_limits()
-    if path == ("initial_state",):
-        data = changed(data, path, dict.fromkeys(data["initial_state"], "1"))
-    elif path == ("graph", "edges"):
-        data = changed(data, path, data["graph"]["edges"][1:])
+    if path == ("problem", "initial_state"):
+        data = changed(data, path, dict.fromkeys(data["problem"]["initial_state"], "1"))
+    elif path == ("problem", "graph", "modes", 0, "edges"):
+        data = changed(data, path, data["problem"]["graph"]["modes"][0]["edges"][1:])
     else:
         data = changed(data, path, str(Fraction(at(data, path)) * Fraction(share)))
     assert false_claims(data) != []

@@ -134,7 +134,7 @@ def test_what_the_verified_checker_would_need_more_for_ends_in_one_line(tmp_path
         program = executable()
     except ParameterError as error:
         pytest.skip(f"no verified checker: {error}")
-    (tmp_path / "c.json").write_text('{"schema": "ptcc-certificate/2", "unverified": [' + "1," * 1_000_000 + "1]}")
+    (tmp_path / "c.json").write_text('{"schema": "ptcc-certificate/3", "unverified": [' + "1," * 1_000_000 + "1]}")
     for words in (["--memory", "0.05"], ["--memory", "0.001"]):
         run = subprocess.run([program, *words, tmp_path / "c.json"], capture_output=True, text=True, check=False)
         assert run.returncode == 2 and run.stdout == "" and run.stderr.count("\n") == 1, run

@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from late_certificates import led_graph
-from mutations import Json, at, changed, judged_mutants, mutants, resealed
+from mutations import Json, at, changed, judged_mutants, mutants, resealed, without
 from oracle import number
 from schema_validator import VALIDATOR
 
@@ -82,8 +82,8 @@ def document(seed: int, name: str) -> Json:
 
 def weights_of(data: Json) -> list[list[tuple[int, int, Fraction]]]:
     """The edges of every mode, at their largest weights."""
-    index = {label: v for v, label in enumerate(data["graph"]["nodes"])}
-    modes = data["graph"]["modes"] if "modes" in data["graph"] else [data["graph"]]
+    index = {label: v for v, label in enumerate(data["problem"]["graph"]["nodes"])}
+    modes = data["problem"]["graph"]["modes"]
     sizes = []
     for mode in modes:
         pairs = [(index[edge[0]], index[edge[1]], edge[2:]) for edge in mode["edges"]]
@@ -94,15 +94,15 @@ def weights_of(data: Json) -> list[list[tuple[int, int, Fraction]]]:
 def false_claims(data: Json) -> list[str]:
     """What is stated of vehicles and does not follow: each bound by its formula, suprema over a fine grid of time."""
     said = data["messages"]
-    told, labels = said["vehicles"], data["graph"]["nodes"]
+    told, labels = said["vehicles"], data["problem"]["graph"]["nodes"]
     a1, a2 = float(number(told["a1"])), float(number(told["a2"]))
-    T, rho1, rho2, kappa = (float(number(data["protocol"][key])) for key in ("T", "rho1", "rho2", "kappa"))
-    k, cap = rho2 * kappa, None if said["gain_cap"] is None else float(number(said["gain_cap"]))
+    T, rho1, rho2, kappa = (float(number(data["problem"]["gain"][key])) for key in ("T", "rho1", "rho2", "kappa"))
+    k, cap = rho2 * kappa, float(number(said["gain_cap"])) if "gain_cap" in said else None
     modes = weights_of(data)
     D = np.max([[sum(float(w) for _, t, w in edges if t == v) for v in range(len(labels))] for edges in modes], axis=0)
     followers = np.flatnonzero(D > 0)
     v0 = np.abs([float(number(told["v0"][label])) for label in labels])
-    leaders = said["leaders"]
+    leaders = said.get("leaders")
     if leaders is not None and (v0[D == 0].any() or number(leaders["disturbance"])):
         return ["vehicles that nothing is proved of"]
     speed = 0.0 if leaders is None else float(number(leaders["speed"]))
@@ -119,10 +119,10 @@ def false_claims(data: Json) -> list[str]:
             continue
         u = np.zeros(len(labels))
         u[followers] = [float(number(x)) for x in step["witness"]["u"]]
-        limit = np.inf if row["cap"] is None else float(number(row["cap"]))
+        limit = float(number(row["cap"])) if "cap" in row else np.inf
         paced = np.minimum(g, limit)
         s = np.concatenate([[0.0], np.cumsum(np.minimum(paced[1:], paced[:-1]) * np.diff(t))])
-        numbers = {key: float(number(x)) for key, x in row.items() if x is not None}
+        numbers = {key: float(number(x)) for key, x in row.items()}
         M, left, lag = numbers["initial"], numbers["left"], 1 / (a1 - b)
         drift, after = numbers.get("drift", 0.0), numbers.get("after", 0.0)
         least["position"] = np.minimum(
@@ -146,7 +146,7 @@ def false_claims(data: Json) -> list[str]:
         push = (v0 * (c * lag + a1 + a2) / g[0] + (c * lag + a1) * p) * y2 + (1 / k + 2 * a1) * cap**2 * n
         least["velocity"] = np.minimum(least["velocity"], velocity)
         least["input"] = np.minimum(least["input"], push)
-    claims = {key: told[key] for key in least if told[key] is not None}
+    claims = {key: told[key] for key in least if key in told}
     return [
         f"{key} of {label}"
         for key, stated in claims.items()
@@ -322,16 +322,17 @@ def test_what_is_not_stated_and_what_is_not_proved_is_refused():
     told = at(free, PATH)
     for data, path, value, why in (
         (free, (*PATH, "velocity"), told["position"], "iff the gain has a cap"),
-        (capped, (*PATH, "input"), None, "iff the gain has a cap"),
+        (capped, (*PATH, "input"), None, "input is null, and not left out"),
         (moving, ("messages", "leaders", "disturbance"), "1/10", "disturbed"),
         (free, (*PATH, "a1"), "0", "not positive"),
     ):
         assert why in (check(resealed(changed(data, path, value))).reason or "")
+    assert "iff the gain has a cap" in (check(resealed(without(capped, (*PATH, "input")))).reason or "")
     leader = next(label for label, x in moving["messages"]["residual"].items() if not number(x))
     assert "a leader that moves" in (check(resealed(changed(moving, (*PATH, "v0", leader), "1"))).reason or "")
-    without = {key: x for key, x in document(1, "plain")["messages"].items() if key != "vehicles"}
+    alone = {key: x for key, x in document(1, "plain")["messages"].items() if key != "vehicles"}
     proof = [step for step in document(1, "plain")["proof"] if step["kind"] != "late-vehicles"]
-    bare = {**document(1, "plain"), "messages": without, "proof": proof}
+    bare = {**document(1, "plain"), "messages": alone, "proof": proof}
     assert check(resealed(bare)).reason == "nothing is late or off, and leaders rest"
 
 

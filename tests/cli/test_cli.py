@@ -26,11 +26,12 @@ from scipy.linalg import expm
 from selection import thinned
 
 from ptcc_certify.bounds.envelope import Envelope
-from ptcc_certify.checker import read
+from ptcc_certify.checker import check, read
 from ptcc_certify.examples import EXAMPLES, GRAPHS, load_graph, select
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import write_graph
 from ptcc_certify.graphs.structure import BEHAVIOURS, analyse
+from ptcc_certify.report.screen import check_summary
 
 pytestmark = pytest.mark.usefixtures("quick_search")
 
@@ -204,7 +205,7 @@ def test_an_error_of_the_program_is_not_taken_for_a_violated_bound(monkeypatch: 
 @pytest.mark.parametrize("method", thinned(["paper", "perron", "lmi", "full", "best"], 2))
 def test_the_method_decides_which_classes_are_searched(method: str):
     data = one_object(ptcc("certify", "fig3a", "--method", method, "--x0", X0, "--json").out)
-    classes = [function["class"] for function in data["lyapunov"]["functions"]]
+    classes = [function["class"] for function in data["decays"]]
     wanted = {"paper": {"paper"}, "best": {"paper", "lmi", "full"}}.get(method, {"paper", method})
     assert classes[0] == "paper" and set(classes) == wanted
     assert set(data["unverified"]["search"]["searched"]) == (
@@ -381,6 +382,16 @@ def test_parameters_of_thousands_of_digits_are_refused_by_name(folder: Path):
         assert name in run.err and "round it" in run.err
 
 
+def test_check_tells_the_claims_of_many_components(folder: Path):
+    Path("many.csv").write_text("".join(f"a{k},b{k},1\n" for k in range(101)) + "foe,a,1\na,foe,-1\n")
+    assert ptcc("certify", "many.csv", "--method", "paper", "--no-simulation", "-o", "many.json").code == 4
+    told = ptcc("check", "many.json", "many.csv")
+    assert (told.code, told.err) == (4, "") and "... 102 components in all" in told.out
+    lines = check_summary("", json.loads(Path("many.json").read_text()), check("many.json"))
+    claim = "interval bipartite consensus (Theorem 2.1), stability (Theorem 1.2) in 102 components"
+    assert claim in " ".join(map(str.strip, lines))
+
+
 def test_check_tells_every_obligation_and_its_verdict_by_exit_code(folder: Path):
     """0 proved, 1 rejected (a changed field, another graph), 4 undecided; the same from the module."""
     assert ptcc("certify", "fig5b", "--no-simulation", "-o", "c.json").code == 0
@@ -389,7 +400,7 @@ def test_check_tells_every_obligation_and_its_verdict_by_exit_code(folder: Path)
         assert run.code == 0 and run.err == ""
         lines = run.out.splitlines()
         if options != ("fig5b",):
-            sha = read("c.json")["graph"]["sha256"]
+            sha = read("c.json")["problem"]["graph"]["sha256"]
             assert (
                 lines.pop(0) == f"graph      16 nodes, 28 edges, as in the file; name yours to compare; SHA-256 {sha}"
             )
@@ -427,7 +438,8 @@ def test_a_rate_beyond_the_upper_bound_is_3_and_one_below_it_4():
     """fig1b: the bound by its slowest mode, below that by its mean eigenvalue; below it, doubt."""
     data = one_object(ptcc("certify", "fig1b", *PAPER, "--json").out)
     proved, limit = Fraction(data["rates"]["proved"]), Fraction(data["rates"]["upper_bound"])
-    mean = 2 * sum(abs(Fraction(w)) for _, _, w in data["graph"]["edges"]) / 5  # trace(L) over 5 nonzero eigenvalues
+    (mode,) = data["problem"]["graph"]["modes"]
+    mean = 2 * sum(abs(Fraction(w)) for _, _, w in mode["edges"]) / 5  # trace(L) over 5 nonzero eigenvalues
     hair = Fraction(1, 10**6)
     assert proved + hair < limit < mean
     for wanted, code in ((proved, 0), (proved + hair, 4), (limit, 4), (limit + hair, 3), (mean, 3)):
@@ -525,8 +537,8 @@ def test_json_is_exactly_one_object(command: str, name: str):
     assert run.err == ""
     data = one_object(run.out)
     assert run.out.count("\n") == 1 and run.out.isascii()
-    assert {"graph", "structure", "claim"} <= set(data)
-    assert (data["claim"] is None) == (name in ("apart", "isolated")) == ("components" in data)
+    assert {"problem", "structure"} <= set(data) and "graph" in data["problem"] and len(data["structure"]) == 1
+    assert ("claim" not in data) == (name in ("apart", "isolated")) == ("components" in data)
     if command == "certify":
         assert data["verdict"] == "certified"
         assert data == one_object(json.dumps(data))
@@ -560,7 +572,7 @@ def test_a_graph_from_standard_input():
         process("certify", "-", "--json", *PAPER, stdin=text),
     ):
         data = one_object(run.out)
-        assert data["graph"]["edges"] == [["b", "a", "-1"], ["a", "b", "-1"]]
+        assert data["problem"]["graph"]["modes"] == [{"edges": [["b", "a", "-1"], ["a", "b", "-1"]]}]
         assert data["claim"]["behaviour"] == "bipartite consensus"
 
 
@@ -584,12 +596,12 @@ def test_starts_in_every_form(form: str):
             "certify", "fig1b", *PAPER, "--json", "--x0", {"plain": X0, "labelled": labelled, "file": "x0.csv"}[form]
         ).out
     )
-    assert data["initial_state"] == dict(zip("123456", X0.split(","), strict=True))
+    assert data["problem"]["initial_state"] == dict(zip("123456", X0.split(","), strict=True))
 
 
 def test_a_random_start_depends_on_the_seed_alone():
     drawn = [
-        one_object(ptcc("certify", "fig1b", *PAPER, "--json", "--seed", seed).out)["initial_state"]
+        one_object(ptcc("certify", "fig1b", *PAPER, "--json", "--seed", seed).out)["problem"]["initial_state"]
         for seed in ("0", "0", "7")
     ]
     assert drawn[0] == drawn[1] != drawn[2]
@@ -600,7 +612,8 @@ def test_edges_are_read_the_way_that_is_asked_and_it_is_said():
     Path("g.csv").write_text("a,b,1\n")
     for edges, leader, words in ((None, "a", "flows a -> b"), ("listens", "b", "a listens to b")):
         options = [] if edges is None else ["--edges", edges]
-        assert one_object(ptcc("classify", "g.csv", "--json", *options).out)["structure"]["leaders"] == [leader]
+        (structure,) = one_object(ptcc("classify", "g.csv", "--json", *options).out)["structure"]
+        assert structure["leaders"] == [leader]
         assert words in ptcc("classify", "g.csv", *options).out
         assert words in ptcc("certify", "g.csv", *PAPER, *options).out
 
@@ -609,9 +622,9 @@ def test_what_was_merged_dropped_or_mirrored_is_said():
     Path("g.csv").write_text("a,b,1\na,b,2\nb,b,5\n")
     run = ptcc("classify", "g.csv", "--duplicates", "sum", "--drop-self-loops", "--undirected", "--json")
     data = one_object(run.out)
-    assert data["graph"]["edges"] == [["b", "a", "3"], ["a", "b", "3"]]
+    assert data["problem"]["graph"]["modes"] == [{"edges": [["b", "a", "3"], ["a", "b", "3"]]}]
     read = {"orientation": "information", "duplicates": "sum", "self_loops": "dropped 1", "undirected": True}
-    assert data["graph"]["read"] == read
+    assert data["problem"]["graph"]["read"] == read
     screen = ptcc("classify", "g.csv", "--duplicates", "sum", "--drop-self-loops", "--undirected", "-v").out
     assert "duplicates sum" in screen and "self-loops dropped 1" in screen and "undirected" in screen
 
@@ -627,20 +640,21 @@ def test_labels_of_any_kind_are_printed_safely_and_kept():
         assert run.code == 0
         assert all(line.isprintable() for line in run.out.splitlines())
         data = one_object(ptcc(command, name, "--json").out)
-        assert data["graph"]["nodes"] == LABELS
+        assert data["problem"]["graph"]["nodes"] == LABELS
     assert len(ptcc("certify", name).out.splitlines()) <= 24
     run = ptcc("simulate", name, "--samples", "2")
     assert next(csv.reader(io.StringIO(run.out))) == ["t", "remaining", *LABELS, *(f"u({x})" for x in LABELS)]
     items = [f"{label}={k}".replace('"', '""') for k, label in enumerate(LABELS)]
     run = ptcc("certify", name, "--json", "--x0", ",".join(f'"{item}"' for item in items))
-    assert one_object(run.out)["initial_state"] == {label: str(k) for k, label in enumerate(LABELS)}
+    assert one_object(run.out)["problem"]["initial_state"] == {label: str(k) for k, label in enumerate(LABELS)}
     run = ptcc("certify", name, "--x0", ",".join(f'"{item}"' for item in items[:-3]))
     assert_refused(run)
     assert "\u202e" not in run.err
     np.savez("surrogate.npz", A=[[0.0, 1.0], [1.0, 0.0]], labels=["\ud800", "b"])
     run = ptcc("certify", "surrogate.npz", *PAPER, "-o", "c.json", "--json")
     assert run.code == 0
-    assert read("c.json")["graph"]["nodes"] == one_object(run.out)["graph"]["nodes"] == ["\ud800", "b"]
+    for document in (read("c.json"), one_object(run.out)):
+        assert document["problem"]["graph"]["nodes"] == ["\ud800", "b"]
     assert ptcc("simulate", "surrogate.npz").code == 0
 
 
@@ -649,7 +663,7 @@ def test_a_terminal_that_lacks_a_letter_is_no_obstacle():
     name = save("labels.csv", [("中", "b", -1), ("b", "中", -1)])
     env = {"PYTHONIOENCODING": "cp1252", "PYTHONUTF8": "0"}
     assert process("certify", name, env=env).code == 0
-    assert one_object(process("certify", name, "--json", env=env).out)["graph"]["nodes"] == ["中", "b"]
+    assert one_object(process("certify", name, "--json", env=env).out)["problem"]["graph"]["nodes"] == ["中", "b"]
     assert process("classify", "中.csv", env=env).code == 2
 
 
@@ -885,6 +899,7 @@ def test_design_answers_with_gains_a_refutation_or_neither(folder: Path):
 
 
 @pytest.mark.campaign
+@pytest.mark.usefixtures("every_class")
 def test_the_command_that_design_prints_proves_its_gains_again(folder: Path):
     rng, capped = np.random.default_rng(1), 0
     graphs = ["fig1a", "fig3b", "fig5b"]
@@ -902,7 +917,8 @@ def test_the_command_that_design_prints_proves_its_gains_again(folder: Path):
         again = ptcc(*command, "--json", "--no-simulation")
         assert again.code == 0, (asked, command, again.err)
         proved = one_object(again.out)
-        assert proved["protocol"] == {k: found["protocol"][k] for k in proved["protocol"]}
+        gain = proved["problem"]["gain"]
+        assert gain == {k: found["protocol"][k] for k in gain}
         effort = proved["input"]
         if found["gain_cap"] is None:
             agents = max(map(Fraction, effort["peak"]["agents"].values()))

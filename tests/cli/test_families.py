@@ -75,10 +75,8 @@ def test_standard_input_holds_intervals_or_a_mode():
     assert unsure.code == 0 and "for every signal" in unsure.out
     assert "for every signal" in ptcc("classify", "day.csv", "-", "--switching", stdin=FILES["night.csv"].encode()).out
     switching = ("day.csv", "-", "--switching", "--json")
-    assert (
-        json.loads(ptcc("certify", *switching, stdin=FILES["night.csv"].encode()).out)["graph"]["modes"][1]["name"]
-        == "stdin"
-    )
+    document = json.loads(ptcc("certify", *switching, stdin=FILES["night.csv"].encode()).out)
+    assert document["problem"]["graph"]["modes"][1]["name"] == "stdin"
     assert "Theorem 2.1" in ptcc("classify", "-", stdin=FILES["day.csv"].encode()).out
     assert "standard input, line 1" in ptcc("classify", "-", stdin=b"a,a,1").err
 
@@ -183,7 +181,7 @@ def test_a_scenario_lists_the_graphs_of_a_family():
 
 def test_the_json_is_the_certificate_or_the_decision():
     certificate = json.loads(ptcc("certify", *BOTH, "--json").out)
-    assert certificate["verdict"] == CERTIFIED and len(certificate["graph"]["modes"]) == 2
+    assert certificate["verdict"] == CERTIFIED and len(certificate["problem"]["graph"]["modes"]) == 2
     decision = json.loads(ptcc("classify", "day.csv", "spoiled.csv", "--switching", "--json").out)
     (part,) = decision["components"]
     assert part["behaviour"] == "depends on the signal" and part["counterexample"]["kind"] == "moving rest state"
@@ -338,7 +336,7 @@ def test_a_family_is_certified_for_every_disturbance(tmp_path: Path, monkeypatch
     assert "T_r + 0.99 T_s" in run.out
     assert ptcc("check", "c.json", *family).code == 0
     data = json.loads(Path("c.json").read_text())
-    assert len(data["lyapunov"]["drives"]) == len(data["lyapunov"]["functions"]) > 0
+    assert len(data["drives"]) == len(data["decays"]) > 0
     assert "reaching time at most" in ptcc("certify", *family, *flags, "-v").out
     assert ptcc("certify", "s.toml", "-o", "s.json").code == 0 == ptcc("simulate", "s.toml", "--steps", "2").code
     assert json.loads(Path("s.json").read_text())["digest"] == data["digest"]
@@ -652,7 +650,7 @@ def test_a_family_is_called_by_its_files_without_their_folders(tmp_path: Path):
 
 def test_a_check_without_graphs_tells_of_which_family_the_certificate_speaks():
     assert ptcc("certify", *BOTH, "-o", "c.json", "-q").code == 0
-    digest = json.loads(Path("c.json").read_text())["graph"]["sha256"]
+    digest = json.loads(Path("c.json").read_text())["problem"]["graph"]["sha256"]
     told = f"graph 2 modes, 3 nodes, 4 edges, as in the file; name yours to compare; SHA-256 {digest} "
     assert " ".join(ptcc("check", "c.json").out.split()).startswith(told)
     assert "as in the file; name" not in ptcc("check", "c.json", *BOTH).out

@@ -61,8 +61,8 @@ def test_a_scenario_stands_for_a_graph_with_all_that_is_asked_about_it():
     assert run.code == 0, run
     assert "met: bipartite consensus" in run.out
     data = json.loads(Path("c.json").read_text())
-    assert data["protocol"]["rho1"] == "1/10" and data["protocol"]["T"] == "2"
-    assert data["initial_state"] == {"ann": "5", "bob": "2", "eve": "17/4", "dan": "-1/3"}
+    assert data["problem"]["gain"]["rho1"] == "1/10" and data["problem"]["gain"]["T"] == "2"
+    assert data["problem"]["initial_state"] == {"ann": "5", "bob": "2", "eve": "17/4", "dan": "-1/3"}
     assert data["unverified"]["simulation"] is None
     assert ptcc("classify", "my data/s.toml").code == 0
     assert ptcc("check", "c.json", "my data/s.toml").code == 0
@@ -107,8 +107,8 @@ def test_a_scenario_gives_what_flags_would_give():
 @pytest.mark.parametrize("order", [("s.toml", "--protocol", "sliding-mode"), ("--protocol", "sliding-mode", "s.toml")])
 def test_a_flag_that_changes_the_protocol_leaves_out_the_parameters_of_the_other_one(order: tuple[str, ...]):
     write()
-    protocol = json.loads(ptcc("certify", *order, "--json").out)["protocol"]
-    assert [protocol[name] for name in ("kind", "T_r", "rho1")] == ["sliding-mode", "1/2", "1/10"]
+    gain = json.loads(ptcc("certify", *order, "--json").out)["problem"]["gain"]
+    assert [gain[name] for name in ("kind", "T_r", "rho1")] == ["sliding-mode", "1/2", "1/10"]
 
 
 @pytest.mark.parametrize(

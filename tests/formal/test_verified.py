@@ -17,7 +17,7 @@ import pytest
 from asked import certify_family, certify_words
 from bad_inputs import ptcc
 from generators import all_classes, random_graph, smallest
-from mutations import changed, mutants, resealed
+from mutations import changed, mutants, resealed, without
 from paper_examples import paper_examples
 from selection import every, thinned
 from verified import AT_REST, SKIPPED, UNREAD, compare, named, program, said
@@ -88,18 +88,18 @@ def test_the_paper_s_examples_are_accepted_and_every_obligation_is_verified_or_n
         (tmp_path / "c.json").write_text(text)
         _, report = verified_check(str(tmp_path / "c.json"))
         assert report.accepted and report.verdict == "certified", report.reason
-        assert report.sha256 == document["graph"]["sha256"]
+        assert report.sha256 == document["problem"]["graph"]["sha256"]
         listed = [f"{o['kind']} of {o['of']}" for o in document["proof"]]
         verified = [f"{o.kind} of {o.of}" for o in report.obligations]
         left = [line for line in report.not_checked if line in listed]
         assert sorted(verified + left) == sorted(listed)
-        moving = AT_REST if any(Fraction(x) for x in (document["sliding_variable"] or {}).values()) else set()
+        moving = AT_REST if any(map(Fraction, document["problem"].get("sliding_variable", {}).values())) else set()
         assert {o["kind"] for o in document["proof"]} - {o.kind for o in report.obligations} <= SKIPPED | moving
 
 
 def test_a_file_that_is_no_certificate_is_unreadable(tmp_path: Path) -> None:
     program()
-    for text in ("", "[]", '{"schema": "ptcc-certificate/1"}', "{" * 1000, '{"a": 1, "a": 2}', '"\xff"', '"\xc0\x80"'):
+    for text in ("", "[]", '{"schema": "ptcc-certificate/2"}', "{" * 1000, '{"a": 1, "a": 2}', '"\xff"', '"\xc0\x80"'):
         file = tmp_path / "c.json"
         file.write_bytes(text.encode("latin-1"))
         with pytest.raises(FormatError):
@@ -113,9 +113,56 @@ def test_the_input_is_spoken_of_iff_a_decay_was_proved(tmp_path: Path) -> None:
         document = json.loads(text)
         kinds = ("input-", "limited-gain", "nominal-disturbed")
         proof = [o for o in document["proof"] if not o["kind"].startswith(kinds)]
-        forged = resealed({**document, "input": None, "proof": proof})
+        forged = resealed(without({**document, "proof": proof}, ("input",)))
         code, text = said(forged, tmp_path)
-        assert code == 1 and "input is null" in text and not check(forged).accepted
+        assert code == 1 and "there is no input" in text and not check(forged).accepted
+
+
+@pytest.mark.parametrize("family", [False, True], ids=["graph", "family"])
+def test_a_part_that_is_absent_is_absent_and_what_is_asked_stands_under_problem(family: bool, tmp_path: Path) -> None:
+    """A key that may be absent is not there with null, none stands where it stood before, and no empty numbers."""
+    program()
+    if family:
+        made = certify_family(
+            Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1)]), NominalProtocol(1, 1, 1, 2), [1, 2]
+        )
+        document = json.loads(made.to_json())
+    else:
+        document = json.loads(paper_examples()[0])
+    assert said(document, tmp_path).code == 0
+    problem, graph = document["problem"], document["problem"]["graph"]
+    bare = next(k for k, o in enumerate(document["proof"]) if "numbers" not in o and "witness" not in o)
+    forged = [
+        changed(document, (*path, key), None)
+        for path, key in (
+            ((), "messages"),
+            ((), "drives" if family else "components"),
+            ((), "reaching_time"),
+            (("problem",), "sliding_variable"),
+            (("problem", "graph", "modes", 0), "undirected"),
+            (("proof", bare), "numbers"),
+            (("proof", bare), "witness"),
+            (("input",), "sliding"),
+        )
+    ]
+    forged += [
+        changed(document, ("proof", bare, "numbers"), {}),
+        changed(document, ("problem", "graph", "modes", 0, "undirected"), False),
+        {**document, "structure": {"modes": document["structure"]} if family else document["structure"][0]},
+        {**document, "structure": document["structure"] * 2},
+        {**document, "lyapunov": {"functions": document["decays"]}},
+        without({**document, "lyapunov": {"functions": document["decays"]}}, ("decays",)),
+        without({**document, "graph": graph}, ("problem", "graph")),
+        without({**document, "protocol": problem["gain"]}, ("problem", "gain")),
+        without({**document, "initial_state": problem["initial_state"]}, ("problem", "initial_state")),
+        changed(document, ("problem", "graph", "modes"), graph["modes"] * 2),
+        changed(document, ("problem", "signal"), "constant"),
+        without(document, ("problem", "signal")) if family else changed(document, ("problem", "signal"), "any"),
+        changed(document, ("claim", "signal"), "any"),
+        changed(document, ("problem", "graph", "modes", 0, "name"), 1),
+    ]
+    for mutant in map(resealed, forged):
+        assert said(mutant, tmp_path).code == 1 and not check(mutant).accepted, mutant
 
 
 def test_what_cannot_be_read_or_told_takes_one_line_and_bounded_memory(tmp_path: Path) -> None:
@@ -139,13 +186,13 @@ def test_claims_besides_those_of_the_graph_are_named_and_not_believed(tmp_path: 
     program()
     document = json.loads(paper_examples()[0])
     for key, kind in (("messages", "late-rows"), ("messages", "late-steps")):
-        false = {"kind": kind, "of": key, "proves": "", "lemma": "", "numbers": {}, "witness": None}
+        false = {"kind": kind, "of": key, "proves": "", "lemma": ""}
         more = {**document, key: {"delay": "0"}, "proof": [*document["proof"], false]}
         code, text = said(resealed(more), tmp_path)
         assert (
             code == 4 and f"not checked {key}, all that is said of" in text and f"not checked {kind} of {key}" in text
         )
-        code, text = said(resealed({**more, key: None, "more": None}), tmp_path)
+        code, text = said(resealed({**more, "more": "0"}), tmp_path)
         assert code == 1 and "unknown" in text
         code, text = said(resealed({**document, "proof": more["proof"]}), tmp_path)
         assert code == 1 and "nothing asks for" in text
@@ -189,7 +236,7 @@ def test_what_is_said_of_an_obligation_is_what_the_theorem_says(tmp_path: Path) 
     edges = [("a", "b", 1), ("b", "a", -1), ("b", "c", -2), ("c", "d", 1)]
     cert = certify(edges, NominalProtocol(2, 3, 1, 2), [1, 2, 3, -4], asks=Asks(simulation=False, method="full"))
     text = said(json.loads(cert.to_json()), tmp_path).text
-    assert re.search(r"verified    overshoot of lyapunov\.functions\[\d\]: lowest I <= P <= highest I", text)
+    assert re.search(r"verified    overshoot of decays\[\d\]: lowest I <= P <= highest I", text)
     modes = [[("a", "b", w), ("b", "a", w)] for w in (1, 5)]
     family = Family.switching([SignedDigraph.from_edges(edges) for edges in modes])
     made = certify_family(family, NominalProtocol(1, 1, 1, 2), [1, 2])
@@ -214,7 +261,7 @@ def test_late_messages_of_leaders_that_move_are_named_with_all_their_obligations
     for more in ({"messages": late}, {"messages": late, "leaders": MovingLeaders("0.5")}):
         cert = certify_words(edges, NominalProtocol(1, 1, 1, 2), [1, 2, 3, 4], simulation=False, **more)
         document = json.loads(cert.to_json())
-        assert check(document).accepted and (document["messages"]["leaders"] is None) == (len(more) == 1)
+        assert check(document).accepted and ("leaders" not in document["messages"]) == (len(more) == 1)
         code, text = said(document, tmp_path)
         assert code == 4 and "not checked messages, all that is said of" in text and "leaders that move" in text
         listed = {f"{o['kind']} of {o['of']}" for o in document["proof"]}
@@ -239,8 +286,8 @@ def test_the_claim_of_every_weak_component_is_verified(tmp_path: Path) -> None:
         (("components", 0, "final_state", "f"), "9"),
         (("components", 0, "connectivity"), "strong"),
         (("components",), document["components"][:1]),
-        (("structure", "balanced"), True),
-        (("structure", "sign_symmetric"), True),
+        (("structure", 0, "balanced"), True),
+        (("structure", 0, "sign_symmetric"), True),
     ):
         forged = resealed(changed(document, path, new))
         assert not check(forged).accepted
@@ -265,7 +312,7 @@ def test_the_claims_of_more_than_100_weak_components_are_verified(tmp_path: Path
     code, text = said(document, tmp_path)
     assert code == 0 and "verified    claim of graph" in text and len(section["nodes"]) == 102
     objects = [
-        {"nodes": nodes, "connectivity": kind, "claim": None, "final_state": None}
+        {"nodes": nodes, "connectivity": kind, "claim": {}}
         for nodes, kind in zip(section["nodes"], section["connectivity"], strict=True)
     ]
     for path, new in (
@@ -305,7 +352,7 @@ def test_a_lower_bound_on_all_rates_than_is_proved_is_rejected(kind: str, tmp_pa
     place = next(i for i, o in enumerate(document["proof"]) if o["kind"] == kind)
     code, text = said(document, tmp_path)
     assert code == 0 and f"verified    {kind} of rates" in text
-    protocol = {key: Fraction(value) for key, value in document["protocol"].items() if key in ("rho2", "kappa")}
+    protocol = {key: Fraction(value) for key, value in document["problem"]["gain"].items() if key in ("rho2", "kappa")}
     bound = (Fraction(document["rates"]["upper_bound"]) + Fraction(document["rates"]["proved"])) / 2
     bound = Fraction(document["rates"]["proved"]) if kind == "rate-upper-bound" else bound
     forged = changed(document, ("rates", "upper_bound"), str(bound))
@@ -320,8 +367,8 @@ def test_a_lower_bound_on_all_rates_than_is_proved_is_rejected(kind: str, tmp_pa
 def without_efforts(document: dict[str, Any]) -> dict[str, Any]:
     """A certificate that says nothing of peak, energy and path length: they rest on reaching times."""
     proof = [one for one in document["proof"] if one["kind"] not in (*AT_REST, "input-peak")]
-    none = dict.fromkeys(("peak", "energy", "path_length"))
-    return resealed({**document, "input": {**document["input"], **none}, "proof": proof})
+    rest = {key: x for key, x in document["input"].items() if key not in ("peak", "energy", "path_length")}
+    return resealed({**document, "input": rest, "proof": proof})
 
 
 def test_reaching_times_are_verified_and_shorter_ones_are_rejected(tmp_path: Path) -> None:
@@ -379,7 +426,7 @@ def test_what_the_sliding_mode_adds_to_the_input_is_verified(tmp_path: Path) -> 
             ).to_json()
         )
         code, text = said(document, tmp_path)
-        assert code == 0 and "verified    sliding-bound of protocol" in text
+        assert code == 0 and "verified    sliding-bound of gain" in text
         assert ("verified    input-sliding of input" in text) == stated
         if not stated:
             continue
@@ -399,7 +446,7 @@ def test_what_the_sliding_mode_adds_to_the_input_is_verified(tmp_path: Path) -> 
         for path, new in (
             (("reaching_time", "bound"), "||sigma(t)|| <= 0"),
             (("input", "sliding", "bounded"), mu3 != "0.5"),
-            (("protocol", "delta"), "2"),
+            (("problem", "gain", "delta"), "2"),
         ):
             forged = resealed(changed(document, path, new))
             assert said(forged, tmp_path).code == 1 and not check(forged).accepted, path
@@ -558,7 +605,7 @@ def test_while_sliding_variables_move_no_instant_before_they_rest_proves_a_bound
             assert not check(mutant).accepted and (code == 1 or f"{one['kind']} of input" in named(text)), (one, new)
     # sliding variables that begin elsewhere are at rest at another instant, and drive the state further
     for begin in ("1.5", "-3"):
-        mutant = resealed(changed(document, ("sliding_variable", "b"), begin))
+        mutant = resealed(changed(document, ("problem", "sliding_variable", "b"), begin))
         assert not check(mutant).accepted and said(mutant, tmp_path).code == 1
 
 
@@ -566,7 +613,8 @@ def about_efforts(document: dict[str, Any], path: tuple[str | int, ...]) -> bool
     """Whether a path leads to what the input takes, to its proof, or to how sliding variables move."""
     of_proof = [i for i, one in enumerate(document["proof"]) if one["kind"] in (*AT_REST, "input-peak")]
     return (
-        path[0] in ("sliding_variable", "reaching_time", "protocol")
+        path[0] == "reaching_time"
+        or path[:2] in (("problem", "sliding_variable"), ("problem", "gain"))
         or (
             path[0] == "input"
             and path[1:2] in [(key,) for key in ("peak", "energy", "path_length", "constants", "initial_set")]
@@ -690,16 +738,16 @@ def test_limits_disturbance_and_noise_are_named_and_none_can_be_added(tmp_path: 
 def test_no_text_of_the_file_is_printed_as_a_line_of_its_own(tmp_path: Path) -> None:
     program()
     document = json.loads(paper_examples()[0])
-    forged = {**document["proof"][-1], "of": "input\u2028verified    rate of lyapunov.functions[99]"}
+    forged = {**document["proof"][-1], "of": "input\u2028verified    rate of decays[99]"}
     text = json.dumps(resealed({**document, "proof": [*document["proof"], forged]}), ensure_ascii=False)
     (tmp_path / "c.json").write_text(text, encoding="utf-8")
     _, report = verified_check(str(tmp_path / "c.json"))
     assert not report.accepted and not report.obligations
-    label = "a\u2028verified    rate of lyapunov.functions[99]\u0085"
+    label = "a\u2028verified    rate of decays[99]\u0085"
     named = certify([(label, "b", 1), ("b", label, 1)], NominalProtocol(1, 1, 1, 1), asks=Asks(simulation=False))
     (tmp_path / "c.json").write_text(named.to_json(), encoding="utf-8")
     _, report = verified_check(str(tmp_path / "c.json"))
-    assert report.accepted and "lyapunov.functions[99]" not in {o.of for o in report.obligations}
+    assert report.accepted and "decays[99]" not in {o.of for o in report.obligations}
 
 
 @pytest.mark.parametrize("number", thinned(range(12)))

@@ -13,7 +13,7 @@ import pytest
 from agent_documents import Setting, ball, damped, ends, exponential
 from agent_documents import document as made
 from generators import all_classes, random_graph
-from mutations import Json, at, changed, mutants, nudged, resealed
+from mutations import Json, at, changed, mutants, nudged, resealed, without
 from selection import every
 from verified import compare, named, program, said
 
@@ -105,7 +105,7 @@ def test_phases_are_named_as_not_checked_and_the_rest_is_verified(tmp_path: Path
 def told(document: Json, path: tuple[str | int, ...], new: Any) -> Json:
     """A change that the proof tells as well, and a digest that fits."""
     for k, stated in enumerate(document["proof"]):
-        if stated["of"] == "agents" and path[0] == "agents" and path[-1] in stated["numbers"]:
+        if stated["of"] == "agents" and path[0] == "agents" and path[-1] in stated.get("numbers", {}):
             document = changed(document, ("proof", k, "numbers", path[-1]), new)
     return resealed(changed(document, path, new))
 
@@ -133,7 +133,7 @@ def test_what_is_forged_is_rejected_by_both_checkers(tmp_path: Path) -> None:
         (("agents", "own", 0), "1", "feedback"),
         (("agents", "initial_state", "b", 0), ["1"], "derivatives"),
         (("agents", "order"), 3, "number of rows"),
-        (("protocol", "rho2"), "1/4", "r k is not above"),
+        (("problem", "gain", "rho2"), "1/4", "r k is not above"),
     ):
         forged = told(document, path, new)
         assert not check(forged).accepted, path
@@ -162,7 +162,6 @@ def test_what_is_forged_under_a_cap_is_rejected_by_both_checkers(name: str, tmp_
         (("agents", "residual", "agents", "b", 0), times(rows["b"][0], "0.99999"), "agent-residual"),
         (("agents", "residual", "agents", "f", 1), times(rows["f"][1], "0.99999"), "agent-residual"),
         (("agents", "residual", "agents", "a", 0), "-1", "agent-residual"),
-        (("agents", "residual"), None, "iff"),
         (("agents", "input", "agents", "b"), times(entry["b"], "0.99999"), "input"),
         (("agents", "gain_cap"), times(own["gain_cap"], "2"), "points" if not late else "agent-"),
         (("agents", "gain_cap"), "0", "not positive"),
@@ -171,6 +170,8 @@ def test_what_is_forged_under_a_cap_is_rejected_by_both_checkers(name: str, tmp_
         (("agents", "own", 1), "1", "feedback"),
     ):
         refused(document, path, new, where, tmp_path)
+    untold = resealed(without(document, ("agents", "residual")))
+    assert not check(untold).accepted and "iff" in said(untold, tmp_path).text
     # less is claimed
     for path, new in (
         (("agents", "residual", "agents", "b", 0), times(rows["b"][0], 2)),
@@ -215,7 +216,7 @@ def test_where_agents_that_meet_at_rest_end_is_verified_and_what_is_forged_of_it
     wide = {"mid": document["agents"]["motion"][0][1], "radius": "1/1000"}
     refused(document, ("agents", "motion", 0, 1), wide, "known exactly", tmp_path)
     assert said(document, tmp_path).code == 0
-    far = told(document, ("protocol", "rho1"), "300")
+    far = told(document, ("problem", "gain", "rho1"), "300")
     assert not check(far).accepted
     code, text = said(far, tmp_path)
     assert code == 1
@@ -276,7 +277,7 @@ def test_the_input_of_agents_that_meet_at_rest_is_verified_and_what_is_forged_of
     # a bound that is true at the begin where the own velocity grows faster than the gain fades
     for setting in (Setting(damping=F(1, 3)), Setting(damping=F(2), plant=(F(0), F(-3)))):
         document, known = made(CAMPS, setting), made(CAMPS, SETTINGS["at rest"])
-        assert document["agents"]["input"] is None
+        assert "input" not in document["agents"]
         steps = [o for o in known["proof"] if o["kind"] == "agent-input"]
         forged = {**document, "proof": document["proof"] + steps}
         vast = {"agents": dict.fromkeys(known["agents"]["input"]["agents"], "1000000"), "largest": "1000000"}
@@ -306,12 +307,12 @@ def test_what_is_left_is_named_where_the_decay_is_too_long_to_be_enclosed(tmp_pa
 def test_where_no_function_used_has_a_deviation_it_is_named_that_all_agree(tmp_path: Path) -> None:
     program()
     document = made(CAMPS, Setting(order=3, method="best", start=False))
-    functions = document["lyapunov"]["functions"]
+    functions = document["decays"]
     k = next(k for k, f in reversed(list(enumerate(functions))) if f["class"] == "full")
     proof = [o for o in document["proof"] if o["kind"] != "input-constants"]
-    proof = [o for o in proof if (o["kind"], o["of"]) != ("deviation", f"lyapunov.functions[{k}]")]
-    document = changed({**document, "proof": proof}, ("lyapunov", "functions", k, "deviation"), None)
-    document = resealed(changed(document, ("agents", "functions"), [{"function": k, "inputs": None}]))
+    proof = [o for o in proof if (o["kind"], o["of"]) != ("deviation", f"decays[{k}]")]
+    document = without({**document, "proof": proof}, ("decays", k, "deviation"))
+    document = resealed(changed(document, ("agents", "functions"), [{"function": k}]))
     assert check(document).accepted
     code, text = said(document, tmp_path)
     assert code == 4 and "not checked claim, that all agree at the deadline" in text
@@ -348,8 +349,8 @@ def again(mutant: Json, path: Any, new: str) -> Json:
 
 def own_mutants(document: Json, every: int, start: int, nudges: int) -> list[tuple[tuple[str | int, ...], Json]]:
     """Changes of what agents of order n have, and small ones of numbers anywhere."""
-    parts = ("agents", "protocol", "proof", "verdict")
-    small = nudged(document, ("agents", "protocol", "graph", "lyapunov"), start, nudges, again)
+    parts = ("agents", "problem", "proof", "verdict")
+    small = nudged(document, ("agents", "problem", "decays"), start, nudges, again)
     return [(path, x) for path, x in mutants(document, every, start) if path[0] in parts] + list(small)
 
 

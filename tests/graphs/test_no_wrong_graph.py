@@ -1185,7 +1185,7 @@ def test_a_certificate_tells_how_its_graph_was_read_and_the_check_reads_it_so(tm
     path, out = put(tmp_path, "g.csv", TABLE), tmp_path / "c.json"
     done = run("certify", str(path), *FLAGS, "--no-simulation", "-o", str(out))
     assert done.code in (0, 4), done.err
-    read = json.loads(out.read_text())["graph"]["read"]
+    read = json.loads(out.read_text())["problem"]["graph"]["read"]
     assert (read["zeros"], read["columns"], read["self_loops"]) == ("dropped 1", "from,to,score", "dropped 1")
     flags = "--edges information --duplicates last --drop-self-loops --drop-zeros --undirected --columns from,to,score"
     assert reading_flags(read) == flags
@@ -1193,14 +1193,14 @@ def test_a_certificate_tells_how_its_graph_was_read_and_the_check_reads_it_so(tm
     assert run("check", str(out), str(path), *FLAGS, "--columns", "1,2,4").code == 1
     for key, wrong in (("zeros", "dropped"), ("laplacian", "yes"), ("columns", 3), ("variable", None)):
         document = json.loads(out.read_text())
-        document["graph"]["read"][key] = wrong
+        document["problem"]["graph"]["read"][key] = wrong
         assert not ptcc.check(document).accepted
 
 
 def test_a_laplacian_is_checked_as_it_was_certified(tmp_path):
     path, out = put(tmp_path, "L.npy", npy([[1, -1], [-1, 1]])), tmp_path / "c.json"
     assert run("certify", str(path), "--laplacian", "--no-simulation", "-o", str(out)).code == 0
-    assert json.loads(out.read_text())["graph"]["read"]["laplacian"] is True
+    assert json.loads(out.read_text())["problem"]["graph"]["read"]["laplacian"] is True
     assert run("check", str(out), str(path), "--laplacian").code == 0
 
 

@@ -157,10 +157,10 @@ def test_the_check_rounds_to_the_safe_side(k: int, stdlib: bool):
     data = made(k).to_dict()
     report = check(data, stdlib=stdlib)
     assert report.accepted
-    functions, effort, rates = data["lyapunov"]["functions"], data["input"], data["rates"]
+    functions, effort, rates = data["decays"], data["input"], data["rates"]
     for step, told in zip(report.obligations, data["proof"], strict=True):
-        said, numbers = step.detail, {key: Fraction(x) for key, x in told["numbers"].items()}
-        which = re.search(r"functions\[(\d+)\]", step.of)
+        said, numbers = step.detail, {key: Fraction(x) for key, x in told.get("numbers", {}).items()}
+        which = re.search(r"decays\[(\d+)\]", step.of)
         function = functions[int(which[1])] if which else None
         if "b" in numbers:
             below(re.findall(rf"^b = {NUMBER}", said), numbers["b"])

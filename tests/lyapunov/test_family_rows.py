@@ -37,10 +37,9 @@ def least_eigenvalue(family: Family, nodes: np.ndarray) -> float:
 def compare(seed: int) -> None:
     family = random_followers(random.Random(seed))
     decay = follower_decay(family)
-    assert decay is not None and decay.upper_bound is not None
+    assert decay is not None
     best = least_eigenvalue(family, decay.nodes)
     assert 0.999 * best < float(decay.rate) <= best * (1 + 1e-9)
-    assert best * (1 - 1e-9) <= float(decay.upper_bound) < best * (1 + 1e-4)
 
 
 @pytest.mark.parametrize("seed", range(25))
@@ -58,8 +57,7 @@ def test_the_largest_weights_lead_to_the_slowest_agent():
     """|w+| where d_l > d_k: an agent that listens more to a slow one is slower."""
     decay = follower_decay(Family.from_intervals([("a", "b", 2, 2), ("b", "c", 1, 1), ("c", "b", 1, 9)]))
     least = follower_decay(Family.from_intervals([("a", "b", 2, 2), ("b", "c", 1, 1), ("c", "b", 1, 1)]))
-    assert decay.upper_bound < least.rate / 2
-    assert decay.slowest.largest.tolist() == [False, True, False]
+    assert decay.rate < least.rate / 2
 
 
 def test_a_rate_above_that_of_the_rows_is_refused():
@@ -98,10 +96,10 @@ def test_weights_of_floats_and_of_long_fractions_are_taken_exactly():
 # ---------------------------------------------------------------------- traps
 
 
-def test_a_weight_of_unknown_sign_makes_a_larger_family_and_claims_no_slowest_member():
+def test_a_weight_of_unknown_sign_makes_a_larger_family():
     family = Family.from_intervals([("a", "b", 1, 1), ("b", "c", -1, 2), ("c", "b", 1, 1), ("a", "c", 1, 1)])
     decay = follower_decay(family)
-    assert decay.rate > 0 and decay.upper_bound is None and decay.slowest is None
+    assert decay.rate > 0
 
 
 def test_undirected_edges_are_one_parameter_so_that_rows_are_sufficient_only():
@@ -124,23 +122,18 @@ def test_undirected_edges_are_one_parameter_so_that_rows_are_sufficient_only():
         )
     )
     decay = follower_decay(led, np.array([1, 2]))
-    assert decay.rate > 0 and decay.upper_bound is None
+    assert decay.rate > 0
     levels = [laplacian(led.modes[0], np.full(keep.size, high))[1:, 1:] for high in (False, True)]
     assert float(decay.rate) < 0.9 * min(np.linalg.eigvals(block).real.min() for block in levels)
 
 
-def test_rows_of_several_modes_claim_no_slowest_member_and_may_fail_where_all_modes_decay():
+def test_rows_of_several_modes_may_fail_where_all_modes_decay():
     first = Family.from_intervals([("a", "b", 1, 1), ("b", "c", 1, 1)], nodes="abc")
     second = Family.from_intervals([("a", "c", 1, 1), ("c", "b", 1, 1)], nodes="abc")
     assert follower_decay(first) is not None and follower_decay(second) is not None
     assert follower_decay(Family.switching([first, second])) is None
     same = follower_decay(Family.switching([first, first]))
-    assert same.rate > 0 and same.upper_bound is None
-
-
-def test_edges_that_keep_no_camps_claim_no_slowest_member():
-    family = Family.from_intervals([("a", "b", 1, 2), ("b", "c", 1, 1), ("c", "b", -2, -1), ("a", "c", 1, 1)])
-    assert follower_decay(family).upper_bound is None
+    assert same.rate > 0
 
 
 def test_leaders_and_unbalanced_blocks_are_no_followers():

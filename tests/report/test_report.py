@@ -370,7 +370,7 @@ def test_hostile_texts_are_shown_as_texts(tmp_path: Path):
         tmp_path / "c.json"
     )
     evil = '<svg onload="alert(1)">\u202e\x1b http://evil.example'
-    path = forged(tmp_path, producer=evil, protocol={"disturbance": evil}, unverified={"notes": [evil], "x": evil})
+    path = forged(tmp_path, producer=evil, gain={"disturbance": evil}, unverified={"notes": [evil], "x": evil})
     odd = path.with_name("c '<b>\".json")
     path.rename(odd)
     assert write_report(odd, tmp_path / "c.html") == "certified"
@@ -441,7 +441,7 @@ def test_without_a_proved_rate_little_is_said(tmp_path: Path):
     nothing = dict.fromkeys(("paper", "diagonal", "proved", "upper_bound"))
     proof = [s for s in data["proof"] if s["kind"] in ("structure", "claim", "final-state")]
     less = {"paper": None, "overshoot": None, "input": None, "verdict": "undecided", "proof": proof}
-    path = forged(tmp_path, lyapunov={"functions": []}, rates=nothing, **less)
+    path = forged(tmp_path, decays=[], rates=nothing, **less)
     assert write_report(path, tmp_path / "c.html") == write_report(path, tmp_path / "c.tex") == "undecided"
     page = sound((tmp_path / "c.html").read_text(encoding="utf-8"))
     assert "no decay was proved" in page.text and "No rate of decay was proved" in page.text
