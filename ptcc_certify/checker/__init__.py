@@ -215,7 +215,8 @@ def _verdict(doc: Document) -> str:
     if "agents" in doc:
         need("messages" not in doc, "agents of order n with late messages or moving leaders")
         return doc.close(check_agents(doc, verified))
-    need("phases" not in doc and "instants" not in doc, "phases or instants of agents that are not of order n")
+    for key in ("phases", "instants"):
+        doc.refuse(key, f"{key} of agents that are not of order n")
     check_input(doc, verified)
     check_messages(doc, verified, protocol, begin)
     return doc.close("influence" in doc and (rate is not None or not graph.listening))

@@ -62,11 +62,11 @@ def check_phases(doc: Document, agents: Agents, used: Sequence[Used]) -> None:
     """Verify faster decrease of functions that are used, from some ``zeta`` on, by matrices not below the former."""
     if "phases" not in doc:
         return
+    section = doc.section("phases")
     need(agents.cap is None, "phases of a gain that is capped")
+    need(0 < len(section) <= MANY_PHASES, f"no phase, or more than {MANY_PHASES}")
     former = {use.number: (agents.W, 1 / agents.first_gain) for use in used}
     rates = {use.number: use.function.rate for use in used}
-    section = doc.section("phases")
-    need(len(section) <= MANY_PHASES, f"more than {MANY_PHASES} phases")
     for k, entry in enumerate(section):
         doc.at = f"phases[{k}]"
         number, rate, coupling = entry.function, entry.rate, entry.coupling

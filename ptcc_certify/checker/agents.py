@@ -48,7 +48,7 @@ def check_agents(doc: Document, verified: Verified) -> bool:
     """
     _check_document(doc, verified)
     if isinstance(doc.data["agents"], dict) and "cascade" in doc.data["agents"]:
-        need("phases" not in doc, "phases of the cascade")
+        doc.refuse("phases", "phases of the cascade")
         return check_cascade(doc, verified)
     section, graph = doc.section("agents"), verified.structure.graph
     agents = agents_of(section, verified.gain)
@@ -73,10 +73,8 @@ def check_agents(doc: Document, verified: Verified) -> bool:
 
 def _check_document(doc: Document, verified: Verified) -> None:
     """Verify that the parts that speak of agents of order 1 are empty, and that no sliding variable moves."""
-    doc.at = "initial_state"
-    need("initial_state" not in doc, "an initial state beside that of the agents")
-    doc.at = "input"
-    need("input" not in doc, "an input beside that of the agents")
+    doc.refuse("initial_state", "an initial state beside that of the agents")
+    doc.refuse("input", "an input beside that of the agents")
     doc.at = "sliding_variable"
     need(not any(verified.begin.sigma or ()), "agents of order n begin with sliding variables that are 0")
 

@@ -142,7 +142,7 @@ def check_means(
     family: Family, witness: Sequence[Mapping[str, Any] | None] | None, x: Sequence[Fraction]
 ) -> list[tuple[dict[int, list[int]], dict[int, Fraction]]]:
     """Return of every component the sets ``A_j`` and, where a witness proves them, the ``c_j``."""
-    given = witness or [None] * len(family.components)
+    given = [None] * len(family.components) if witness is None else witness
     need(len(given) == len(family.components), f"means has not {len(family.components)} entries")
     result = []
     for component, entry in zip(family.components, given, strict=True):

@@ -78,6 +78,11 @@ class Document:
         """Tell whether a part is there."""
         return key in self.parts
 
+    def refuse(self, key: str, why: str) -> None:
+        """Reject a part if it is there."""
+        self.at = key
+        need(key not in self.parts, why)
+
     def section(self, key: str) -> Any:
         """Return a part of the document, as it is declared, None if it is absent; it is what is verified next."""
         self.at = key

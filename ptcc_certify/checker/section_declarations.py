@@ -166,7 +166,7 @@ _TYPES = {int: "an integer", bool: "true or false", str: "a text", dict: "an obj
 
 
 def _names(kind: Any) -> str:
-    return "not one of " + ", ".join(map(str, get_args(kind)))
+    return "not one of " + ", ".join(str(x).lower() if isinstance(x, bool) else str(x) for x in get_args(kind))
 
 
 def parts_of(section: type, value: Any, what: str) -> list[Declared]:
@@ -246,7 +246,7 @@ def _annotated(kind: Any, value: Any, at: Context, what: str) -> Any:
     if note == "a ball":
         return interval(value)
     if note == "a list":
-        return [read(get_args(inner)[0], one, at, what) for one in entries(value, what)]
+        return [read(get_args(inner)[0], one, at, f"an entry of {what}") for one in entries(value, what)]
     if note == "lower triangle":
         return triangle(value, len(entries(value, what)))
     if note == "a label":

@@ -299,4 +299,6 @@ def _components(doc: Document, graph: Digraph, expected: Sequence[Any]) -> list[
             need(items == [number[v] for v in range(graph.n)], "other components")
             reference["nodes"] = section["nodes"]
     need(same(section, reference), "other components, or another claim of one")
+    ordered = all(list(state) == nodes for nodes, state in zip(labels, states, strict=True) if state is not None)
+    need(ordered, "agents of a component are in another order")
     return list(zip(groups, states, strict=True))

@@ -218,7 +218,7 @@ def test_a_mean_that_is_not_kept_is_refused():
         assert why in str(answer(data)), entry
     for witness, why in (
         ([{"2": "equal"}], "means of a component"),
-        ([], "not enclosed"),
+        ([], "means has not 1 entries"),
         ([None], "not enclosed"),
         (None, "witness is null, and not left out"),
         ({"1": "equal"}, "not a list"),

@@ -125,6 +125,8 @@ def test_phases_that_are_not_told_are_not_proved():
     document = {key: part for key, part in made("order 4").to_dict().items() if key != "phases"}
     report = check(resealed(document))
     assert not report.accepted and report.rejected != "digest"
+    report = check(resealed({**document, "phases": []}))
+    assert (report.rejected, report.reason) == ("phases", "no phase, or more than 100")
 
 
 def test_phases_stand_beside_agents_of_order_n_without_a_cap_alone():
@@ -141,4 +143,4 @@ def test_phases_stand_beside_agents_of_order_n_without_a_cap_alone():
         document = certificate.to_dict()
         assert check(document).accepted and "phases" not in document
         report = check(resealed({**document, "phases": phases}))
-        assert not report.accepted and reason in (report.reason or "")
+        assert report.rejected == "phases" and reason in (report.reason or "")

@@ -812,6 +812,15 @@ def test_labels_that_are_the_keys_of_a_side_vector():
     accepted_beside(*with_side_files(data))
 
 
+def test_final_states_of_a_component_are_in_the_order_of_its_nodes():
+    graph = SignedDigraph.from_edges([("a", "b", 1), ("c", "d", -1), ("d", "c", -1)])
+    data = json.loads(certify(graph, NOMINAL, [1, 2, 3, 4], asks=Asks(simulation=False)).to_json())
+    accepted(data)
+    path = ("components", 1, "final_state")
+    turned = dict(reversed(data["components"][1]["final_state"].items()))
+    rejected(changed(data, path, turned), "claim of graph")
+
+
 def test_many_components_are_numbered(tmp_path: Path):
     pairs = [(f"a{i}", f"b{i}", -1) for i in range(checker.MANY_COMPONENTS + 5)]
     data = json.loads(certify(SignedDigraph.from_edges(pairs), NOMINAL, asks=Asks(simulation=False)).to_json())

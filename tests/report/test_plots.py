@@ -58,6 +58,7 @@ from ptcc_certify.report.plots.style import DOUBLE_COLUMN, EDGE_STYLES, SINGLE_C
 from ptcc_certify.report.plots.tracking import plot_tracking
 from ptcc_certify.report.plots.trade_off import plot_trade_off
 from ptcc_certify.report.plots.trajectory import plot_run, plot_sliding, plot_trajectory
+from ptcc_certify.report.report_file import write_report
 from ptcc_certify.simulation.nominal import Bounded
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
@@ -1073,3 +1074,12 @@ def test_bars_of_final_states_that_agree_but_for_last_digits_are_drawn(ends: tup
     assert sum(bar.get_height() for bar in ax.patches) == 6  # type: ignore[attr-defined]
     low, high = ax.get_xlim()
     assert all(low <= x <= high for x in ends)
+
+
+def test_states_of_very_different_sizes_are_those_of_the_certificate(tmp_path: Path) -> None:
+    """A run that is integrated less its targets begins at small states but for the rounding of large ones."""
+    graph = SignedDigraph.from_edges([("a1", "a2", "11/50")], nodes=[f"a{k}" for k in range(6)])
+    start, protocol = ["4e5", "4e5", "1e-7", "1e-7", "1/3", "1e-7"], NominalProtocol("0.133", "2.3", "8.3", 4)
+    leaders, limits = MovingLeaders(speed="0.355"), GainLimits(gain_cap="2.28")
+    moved = certify(graph, protocol, start, leaders=leaders, limits=limits, asks=Asks(simulation=False))
+    assert write_report(moved, tmp_path / "moved.html") == "certified"
