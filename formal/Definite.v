@@ -119,9 +119,10 @@ Proof.
 Qed.
 
 (** * Finding a factor: an even diagonal, integer square roots, rounded divisions, and exactly what they leave *)
-Definition even_scale (bits : Z) (H : mat) : vec :=
-  let e := map (fun r => (Z.log2 (hd 0 r) / 2)%Z) H in
-  let m := fold_right Z.max bits e in map (fun x => (2 ^ (m - x))%Z) e.
+Definition half_bits (H : mat) : vec := map (fun r => (Z.log2 (hd 0 r) / 2)%Z) H.
+(** bits of the roots, at least so many *)
+Definition width (bits : Z) (H : mat) : Z := fold_right Z.max bits (half_bits H).
+Definition even_scale (bits : Z) (H : mat) : vec := map (fun x => (2 ^ (width bits H - x))%Z) (half_bits H).
 Fixpoint newton (n : nat) (a x : Z) : Z :=
   match n with O => x | S n' => let y := ((x + a / x) / 2)%Z in if (y <? x)%Z then newton n' a y else x end.
 Definition isqrt (a : Z) : Z := if (0 <? a)%Z then newton 64 a (2 ^ (Z.log2 a / 2 + 1)) else 0%Z.
@@ -196,11 +197,15 @@ Definition try_factor (bits : Z) (A : mat) : option factor :=
   let e := half_slack (map snd l) in
   if (length d =? n)%nat && forallb (Z.ltb 0) d && forallb (fun r : vec => (length r <=? n)%nat) A
      && (length e =? n)%nat && forallb (Z.ltb 0) e
-  then Some (Factor d (map fst l) e (2 ^ (3 * bits))%Z) else None.
-Definition factorise (A : mat) : option factor :=
-  match try_factor 100 A with Some f => Some f | None =>
-  match try_factor 300 A with Some f => Some f | None =>
-  match try_factor 1000 A with Some f => Some f | None => try_factor 4000 A end end end.
+  then Some (Factor d (map fst l) e (2 ^ (3 * width bits H))%Z) else None.
+(** what was taken off the diagonal changes no bound by more than [2^-60] of itself, about *)
+Definition fine (f : factor) : bool :=
+  let m := fold_right Z.max 0%Z (fe f) in forallb (fun r => (m * 2 ^ 60 <=? hd 0 r * hd 0 r)%Z) (fT f).
+(** the first factor that is fine, or the last one *)
+Fixpoint finest (l : list Z) (A : mat) (last : option factor) : option factor :=
+  match l with [] => last | bits :: l' =>
+    match try_factor bits A with Some f => if fine f then Some f else finest l' A (Some f) | None => finest l' A last end end.
+Definition factorise (A : mat) : option factor := finest [100; 300; 1000; 4000]%Z A None.
 
 Definition size2 (l : vec) : Z := fold_right (fun a s => (a * a + s)%Z) 0%Z l.
 (** [q (d'x)^2 <= p x'A x], for the factor of [A] *)
@@ -247,13 +252,15 @@ Proof.
   unfold B in C. rewrite half_conj, half_ok in C by reflexivity.
   rewrite (bil_ext_l A _ x) in C by exact P. rewrite (bil_ext_r A n _ _ x RL) in C by exact P. lra.
 Qed.
-Theorem factorise_ok A f : factorise A = Some f -> factor_of A f.
+Lemma finest_ok A f l : forall last, (last = Some f -> factor_of A f) -> finest l A last = Some f -> factor_of A f.
 Proof.
-  unfold factorise. intros H.
-  repeat match type of H with match ?t with _ => _ end = _ =>
-    destruct t eqn:?E; [injection H as <-; eapply try_factor_ok; eassumption|] end.
-  eapply try_factor_ok; eassumption.
+  induction l as [|bits l IH]; intros last L H; [exact (L H)|]. cbn [finest] in H.
+  destruct (try_factor bits A) as [g|] eqn:E; [|exact (IH _ L H)].
+  assert (G : Some g = Some f -> factor_of A f) by (intros [= <-]; eapply try_factor_ok; eassumption).
+  destruct (fine g); [exact (G H)|exact (IH _ G H)].
 Qed.
+Theorem factorise_ok A f : factorise A = Some f -> factor_of A f.
+Proof. apply finest_ok. discriminate. Qed.
 Theorem factor_pos A f : factor_of A f -> pos_def A.
 Proof.
   intros [He [Le [_ H]]] x. destruct (H x) as [z [Hz K]]. pose proof (sumsq_pos (fT f) z) as P.

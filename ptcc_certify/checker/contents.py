@@ -24,7 +24,7 @@ from ptcc_certify.checker.family import (
     KernelWitness,
 )
 from ptcc_certify.checker.final_state import AgentsVector, FormationSection, InfluenceSection
-from ptcc_certify.checker.graph import GraphSection
+from ptcc_certify.checker.graph import FamilySection, GraphSection
 from ptcc_certify.checker.input import EnergyWitness, InputSection, PeakWitness
 from ptcc_certify.checker.lyapunov import FunctionSection, InertiaWitness, MeanWitness, OvershootSection, RatesSection
 from ptcc_certify.checker.messages import MessagesSection, StepsStart
@@ -50,19 +50,26 @@ from ptcc_certify.checker.weighted_squares import FactorWitness
 
 
 @dataclass(frozen=True, kw_only=True)
-class ProblemSection:
-    """What is asked: the graph, the gain of the protocol, and where the agents begin."""
+class AnyProblem:
+    """What is asked: the gain of the protocol, and where the agents begin."""
 
-    graph: GraphSection
     gain: NominalSection | SlidingSection
     initial_state: Agents | None = None
     sliding_variable: Agents | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
-class SignalProblem(ProblemSection):
-    """What is asked of a family: what its graph does under every signal."""
+class GraphProblem(AnyProblem):
+    """What is asked of one graph."""
 
+    graph: GraphSection
+
+
+@dataclass(frozen=True, kw_only=True)
+class SignalProblem(AnyProblem):
+    """What is asked of a family: what it does under every signal."""
+
+    graph: FamilySection
     signal: Literal["any"]
 
 
@@ -72,7 +79,6 @@ class AnyCertificate:
 
     schema: Literal["ptcc-certificate/3"]
     producer: str
-    problem: ProblemSection
     structure: Several[StructureSection]
     reaching_time: ReachingTimes | None = None
     messages: MessagesSection | None = None
@@ -95,6 +101,7 @@ class OfAgents:
 class GraphCertificate(OfAgents, AnyCertificate):
     """A certificate of one graph."""
 
+    problem: GraphProblem
     claim: ClaimSection | None = None
     components: Unread[Several[ComponentSection] | ManyComponents] | None = None
     paper: PaperSection | None = None

@@ -20,7 +20,7 @@ from typing import Any, Literal
 from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import keeps, spend
 from ptcc_certify.checker.document import Document
-from ptcc_certify.checker.graph import NODE_BYTES, GraphSection, UncertainEdgesAside, digraph
+from ptcc_certify.checker.graph import NODE_BYTES, FamilySection, UncertainEdgesAside, digraph
 from ptcc_certify.checker.reading import Interval, RejectedError, entries, exact, need
 from ptcc_certify.checker.section_declarations import (
     Ball,
@@ -242,13 +242,11 @@ def _connectivity(structure: Structure) -> str:
 
 
 def _read_modes(doc: Document) -> tuple[list[str], list[tuple[list[Edge], int, bool]]]:
-    section: GraphSection = doc.section("graph")
+    section: FamilySection = doc.section("graph")
     labels, index = section.nodes, doc.context.know(section.nodes)
     need(0 < len(section.modes) <= MANY_MODES, f"no mode, or more than {MANY_MODES}")
-    need(section.read is None, "how the file of a family was read")
     drafts = []
     for mode in section.modes:
-        need(mode.name is not None, "a mode without a name")
         edges, unit = _edges(doc, mode.edges, index)
         _check_edges(edges, tied := mode.undirected is True)
         drafts.append((edges, unit, tied))

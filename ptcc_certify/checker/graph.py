@@ -61,12 +61,19 @@ class UncertainEdgesAside:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ModeSection:
-    """A mode: its edges; of a family its name, and whether both directions of edges change together."""
+class FixedMode:
+    """The one mode of a fixed graph."""
 
-    name: str | None = None
+    edges: Unread[Several[Edge] | EdgesAside]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModeSection:
+    """A mode of a family: its name, whether both directions of edges change together, and its edges."""
+
+    name: str
     undirected: Literal[True] | None = None
-    edges: Unread[Several[Edge | UncertainEdge] | EdgesAside | UncertainEdgesAside]
+    edges: Unread[Several[Edge | UncertainEdge] | UncertainEdgesAside]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,11 +92,20 @@ class ReadSection:
 
 @dataclass(frozen=True, kw_only=True)
 class GraphSection:
-    """The graph: agents, and who listens to whom, in every mode; of one fixed graph how its file was read."""
+    """A fixed graph: agents, who listens to whom, and how its file was read."""
+
+    nodes: Labels
+    modes: tuple[FixedMode]
+    read: ReadSection
+    sha256: Sha256
+
+
+@dataclass(frozen=True, kw_only=True)
+class FamilySection:
+    """A family: agents, and who listens to whom in every mode."""
 
     nodes: Labels
     modes: Several[ModeSection]
-    read: ReadSection | None = None
     sha256: Sha256
 
 
@@ -97,11 +113,8 @@ def check_graph(doc: Document) -> Digraph:
     """Read nodes and edges of one fixed graph; verify their order and their hash."""
     section: GraphSection = doc.section("graph")
     labels, index = section.nodes, doc.context.know(section.nodes)
-    need(len(section.modes) == 1 and section.read is not None, "a fixed graph has one mode, and tells how it was read")
-    mode = section.modes[0]
-    need(mode.name is None and mode.undirected is None, "a name, or undirected, of the mode of a fixed graph")
     _fit(NODE_BYTES * len(labels))
-    graph = digraph(doc, labels, *_edges(doc, mode.edges, index))
+    graph = digraph(doc, labels, *_edges(doc, section.modes[0].edges, index))
     doc.sha256, doc.context.edges = graph.sha256(), graph.n_edges
     need(section.sha256 == doc.sha256, "the SHA-256 of the edge list is another")
     return graph

@@ -124,10 +124,9 @@ def test_the_schema_is_a_strict_schema():
         "FamilyCertificate": {
             *("claim", "components", "drives", "final_state", "reaching_time", "boxes", "restricted", "messages"),
         },
-        "ProblemSection": {"initial_state", "sliding_variable"},
+        "GraphProblem": {"initial_state", "sliding_variable"},
         "SignalProblem": {"initial_state", "sliding_variable"},
-        "GraphSection": {"read"},
-        "ModeSection": {"name", "undirected"},
+        "ModeSection": {"undirected"},
         "ReadSection": {"zeros", "laplacian", "columns", "variable"},
         "SlidingSection": {"disturbance"},
         "ComponentSection": {"final_state"},
@@ -380,7 +379,7 @@ def test_every_key_is_described():
     assert rows - of_graph - {"agents", "formation", "phases", "instants"} == set(FAMILY["properties"])
     asked = set(re.findall(r"^\| `(\w+)` \|", FORMAT.partition("## 5.")[2].partition("## 6.")[0], re.MULTILINE))
     assert asked == set(SCHEMA["$defs"]["SignalProblem"]["properties"])
-    assert asked - {"signal"} == set(SCHEMA["$defs"]["ProblemSection"]["properties"])
+    assert asked - {"signal"} == set(SCHEMA["$defs"]["GraphProblem"]["properties"])
     for found in objects(SCHEMA):
         for key in found["properties"]:
             assert re.search(rf"[`\"]{re.escape(key)}[`\"]|`rates\.{key}`|`influence\.{key}`", FORMAT), key

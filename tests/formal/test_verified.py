@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from asked import certify_family, certify_words
 from bad_inputs import ptcc
-from generators import all_classes, random_graph, smallest
+from generators import WEIGHTS, all_classes, random_graph, smallest
 from mutations import changed, mutants, resealed, without
 from paper_examples import paper_examples
 from selection import every, thinned
@@ -38,6 +38,7 @@ from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
 
 SOURCES = Path(__file__).resolve().parents[2] / "formal"
+AT_ONCE = Asks(simulation=False)
 
 
 def test_nothing_is_admitted_and_no_axiom_is_added() -> None:
@@ -95,6 +96,16 @@ def test_the_paper_s_examples_are_accepted_and_every_obligation_is_verified_or_n
         assert sorted(verified + left) == sorted(listed)
         moving = AT_REST if any(map(Fraction, document["problem"].get("sliding_variable", {}).values())) else set()
         assert {o["kind"] for o in document["proof"]} - {o.kind for o in report.obligations} <= SKIPPED | moving
+
+
+def test_no_stored_certificate_is_rejected() -> None:
+    """Not either of weights over many magnitudes; of what this checker does not read it says so."""
+    program()
+    stored = sorted((SOURCES.parent / "tests" / "corpus").glob("*.json"))
+    codes = {path.stem: subprocess.run([executable(), path], capture_output=True).returncode for path in stored}
+    assert set(codes.values()) == {0, 2, 4} and codes["odd-labels"] == 0
+    unread = {name for name, code in codes.items() if code == 2}
+    assert unread == {"family-squares", "formation", "undecided"}
 
 
 def test_a_file_that_is_no_certificate_is_unreadable(tmp_path: Path) -> None:
@@ -768,6 +779,18 @@ def test_of_thousands_of_mutants_none_is_accepted_unless_true_or_not_checked(num
     assert count > 3000 // every
 
 
+@pytest.mark.parametrize("weights", WEIGHTS)
+def test_weights_of_any_size_and_length_are_taken(weights: str, tmp_path: Path) -> None:
+    """Of long weights matrices of integers have thousands of bits."""
+    program()
+    for connectivity, balance in (("strong", "unbalanced"), ("quasi-strong", "balanced"), ("weak", "mixed")):
+        rng = np.random.default_rng(len(weights))
+        graph = random_graph(rng, connectivity, balance, n=6, weights=weights).graph
+        made = certify(graph, NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), [3, -1, 4, 1, -5, 9], asks=AT_ONCE)
+        code, text = said(json.loads(made.to_json()), tmp_path)
+        assert code == 0 or (code, made.verdict) == (2, "undecided"), (connectivity, text)
+
+
 @pytest.mark.campaign
 @pytest.mark.parametrize(("name", "kwargs"), all_classes())
 def test_what_the_checker_accepts_of_random_graphs_the_verified_one_accepts(
@@ -778,6 +801,7 @@ def test_what_the_checker_accepts_of_random_graphs_the_verified_one_accepts(
         rng = np.random.default_rng(seed)
         fixed = "isolated" in kwargs and not kwargs["parts"]
         settings = {"n": smallest(**kwargs) + (0 if fixed else seed % 5), **kwargs}
+        settings["weights"] = list(WEIGHTS)[seed % len(WEIGHTS)]
         graph = random_graph(rng, **settings).graph
         protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
         more = {}
