@@ -23,6 +23,7 @@ from ptcc_certify.certificate import graph_certification
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker import check
+from ptcc_certify.checker.reading import interval
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.model import NominalProtocol
 from ptcc_certify.model.agents import Agents
@@ -88,7 +89,9 @@ def as_large(graph: SignedDigraph, kind: str, d: int = 1) -> Certificate:
 
 def ends(certificate: Certificate) -> list[tuple[Fraction, Fraction]]:
     part = certificate.agents
-    assert part is not None and part.final_state is not None
+    if part is None:  # single integrators on a line
+        return [interval(end) for end in certificate.to_dict()["formation"]["final_state"].values()]
+    assert part.final_state is not None
     return [end for agent in part.final_state for chain in agent for end in chain]
 
 
