@@ -50,12 +50,12 @@ def read_document(source: Source) -> tuple[GraphProof | FamilyProof, Observation
     document, sections = source.document, source.report.sections
     protocol, state = read_protocol(sections["gain"]), fractions(sections["initial_state"])
     subject: Structure | Family
-    if of_family := "signal" in document["problem"]:
+    if "signal" in document["problem"]:
         subject, effort = certificate_family(document["problem"]["graph"], source.files), None
     else:
         subject = analyse(certificate_graph(document, source.files))
         effort = with_longest_period(read_effort(source.report, subject, protocol, state), document["unverified"])
-    request = read_request(document["unverified"], None if effort is None else effort.initial_set, not of_family)
+    request = read_request(document["unverified"], None if effort is None else effort.initial_set)
     request = replace(request, **read_unproved(document, subject))
     relative = state is None if isinstance(subject, Family) else sections["final_state"] is None
     late = read_late(source.report, subject, protocol, relative)

@@ -281,14 +281,14 @@ def _write_request(request: Request) -> dict[str, Any]:
     }
 
 
-def read_request(unverified: Mapping[str, Any], initial_set: InitialSet | None, named: bool) -> Request:
-    """Read what was asked, and where it comes from if that is ``named``.
+def read_request(unverified: Mapping[str, Any], initial_set: InitialSet | None) -> Request:
+    """Read what was asked, and where it comes from.
 
     Nothing of it is claimed, so that what cannot be read is left out.
     """
     section, search, seconds = (unverified.get(key) for key in ("asked", "search", "time_limit"))
     scenario, origins = unverified.get("scenario"), unverified.get("origins")
-    origins = origins.items() if isinstance(origins, dict) and named else ()
+    origins = origins.items() if isinstance(origins, dict) else ()
     section = section if isinstance(section, dict) else {}
     method, behaviour = search.get("method") if isinstance(search, dict) else None, section.get("behaviour")
     try:

@@ -165,15 +165,20 @@ class FinalState:
         return Q
 
     @cached_property
-    def deviations(self) -> tuple[Matrix, int, Matrix]:
-        """``D = I - Q`` on the columns ``free_nodes``, times a scale; the scale; ``D'D``."""
+    def deviations(self) -> tuple[Matrix, int]:
+        """``D = I - Q`` on the columns ``free_nodes``, times a scale; the scale."""
         rows, zero = deviation_rows(self.projection), Fraction(0)
-        D, scale = integers([[row.get(v, zero) for v in self.structure.free_nodes] for row in rows])
+        return integers([[row.get(v, zero) for v in self.structure.free_nodes] for row in rows])
+
+    @cached_property
+    def gram(self) -> Matrix:
+        """``D'D``, times the scale of :attr:`deviations` squared."""
+        D, _ = self.deviations
         columns, bits = list(zip(*D, strict=True)), longest(x for row in D for x in row)
         sized(len(columns) ** 2 + len(D) * len(columns), 2 * bits, "D'D")
         spend(len(columns) ** 2 * len(D) // 2, bits, bits, "D'D")
         half = [[sum(map(mul, x, y)) for y in columns[: i + 1]] for i, x in enumerate(columns)]
-        return D, scale, [[half[max(i, j)][min(i, j)] for j in range(len(half))] for i in range(len(half))]
+        return [[half[max(i, j)][min(i, j)] for j in range(len(half))] for i in range(len(half))]
 
 
 def deviation_rows(projection: Sequence[Mapping[int, Fraction]]) -> list[dict[int, Fraction]]:

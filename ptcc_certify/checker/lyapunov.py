@@ -201,13 +201,14 @@ def _deviation(
     doc.open("deviation", of)
     structure, (form, scale) = final.structure, scaled_form
     labels = structure.graph.labels
-    (D, common, gram), S = final.deviations, only(form, structure.free_nodes)
+    (D, common), S = final.deviations, only(form, structure.free_nodes)
     constants = list(section.agents)
     failed = first_unbounded(doc.exact, S, D, (c * common**2 / scale for c in constants))  # proves V > 0 besides
     need(failed is None, f"the constant of agent {shorten(labels[failed or 0])} is not proved")
-    p, q = (section.norm * common**2 / scale).as_integer_ratio()
-    N = combined("the deviation of the norm", (p, S), (-q, gram))
-    need(p >= 0 and doc.exact.definite(N), "the constant of the norm is not proved")
+    if section.norm < sum(constants):
+        p, q = (section.norm * common**2 / scale).as_integer_ratio()
+        N = combined("the deviation of the norm", (p, S), (-q, final.gram))
+        need(p >= 0 and doc.exact.definite(N), "the constant of the norm is not proved")
     doc.done(f"norm at most {up(section.norm)}")
     return constants
 

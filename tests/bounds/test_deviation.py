@@ -18,11 +18,13 @@ from selection import thinned
 
 from lmi.exact.definite import Arithmetic
 from lmi.exact.fast import SMALL_ROWS, FastArithmetic
+from ptcc_certify.bounds.deviation import from_final_state
 from ptcc_certify.bounds.deviation.from_final_state import _constants
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker import check, digest
+from ptcc_certify.checker.final_state import FinalState
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import random_states, read_graph
@@ -194,6 +196,16 @@ def test_a_constant_lowered_by_a_millionth_is_rejected(large: bool, stdlib: bool
             place[path[-1]] = str(Fraction(place[path[-1]]) * (1 - Fraction(1, 10**6)))
             report = check(signed(spoilt), stdlib=stdlib)
             assert report.rejected == f"deviation of decays[{k}]", (path, report.reason)
+
+
+def test_where_its_form_takes_too_long_the_norm_is_bounded_by_the_sum_over_agents(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(from_final_state, "GRAM_WORK", 0)
+    told = json.loads(certify(load_graph("fig3a"), NOMINAL, range(6), asks=Asks(simulation=False)).to_json())
+    monkeypatch.setattr(FinalState, "gram", None)  # no need of it
+    assert check(told).accepted
+    for function in told["decays"]:
+        deviation = function["deviation"]
+        assert Fraction(deviation["norm"]) == sum(map(Fraction, deviation["agents"].values()))
 
 
 @pytest.mark.parametrize("n", [3, SMALL_ROWS, SMALL_ROWS + 8])

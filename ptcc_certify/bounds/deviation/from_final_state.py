@@ -7,7 +7,8 @@ only rows and columns ``nodes`` count: all nodes but the first one of each balan
 
 ``d_k`` a row of ``D``: the best constants there are. The largest eigenvalue of ``D F^-1 D'`` bounds ``||x - Q x||^2``.
 All constants come from one factor of ``F`` in floats and are raised by more than its rounding errors, which are seen in
-what it leaves of the identity; where they are too large, from one in integers. The check proves them.
+what it leaves of the identity; where they are too large, from one in integers. The check proves them; where ``D'D``
+would take it too long, the sum of the ``c_k`` bounds ``||x - Q x||^2``.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ import numpy as np
 from lmi.exact import arithmetic
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.fast import floats, unit_diagonal
+from lmi.exact.numbers import longest
+from lmi.exact.work import EACH_BYTE, GB, cost
 from ptcc_certify.bounds.final_state.of_graph import Influence
 from ptcc_certify.bounds.input.initial_sets import ways
 from ptcc_certify.graphs.structure import Structure
@@ -36,6 +39,8 @@ NEAR, FAR = 2.0**-30, 2.0**-12
 LEAST = 2.0**-900
 #: By how much constants are raised, relatively, so that they are quick to prove; that of the norm instead.
 RAISE, NORM_RAISE = Fraction(1, 2**36), Fraction(1, 2**22)
+#: What ``D'D`` may cost the check: a part of what it may spend for a GB.
+GRAM_WORK = EACH_BYTE * GB // 4
 
 Integers = list[list[int]]
 
@@ -61,7 +66,14 @@ class DeviationGeometry:
         if constants is None:
             return None
         *agents, norm = (rounded(x * unit, CONSTANT_BITS, up=True) for x in constants)
-        return DeviationBound(tuple(agents), norm)
+        return DeviationBound(tuple(agents), norm if self._short else sum(agents, Fraction(0)))
+
+    @cached_property
+    def _short(self) -> bool:
+        """Whether the check can form ``D'D``."""
+        (D, _), width = self._deviation, len(self._nodes)
+        bits = longest(x for row in D for x in row)
+        return cost(width**2 * len(D) // 2, bits, bits) <= GRAM_WORK
 
     @cached_property
     def _nodes(self) -> list[int]:
