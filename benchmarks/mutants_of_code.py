@@ -1,12 +1,13 @@
 """What the tests notice: mutants of the code that proves and checks, and how many of them some test kills.
 
-    python benchmarks/mutants_of_code.py [--count 60] [--seed 0] [--files 6] [--minutes 10]
+    python -m pytest --cov=ptcc_certify --cov=lmi --cov-context=test --cov-report=   # with pytest-cov: .coverage
+    python benchmarks/mutants_of_code.py [--coverage .coverage] [--count 60] [--seed 0] [--part 0/1] [--minutes 2]
 
 A mutant changes one place: a comparison, an operator, an integer by 1, ``and`` for ``or``, ``min`` for ``max``, or it
-leaves a refusal out. In a copy of this folder the tests that are nearest to the module run until one fails: its own
-doctests, the test files that name it, those of its room. What survives the default tests is tried again with ``--all``,
-which tells what the cases that do not run by default are worth. A survivor need not be a defect: the change may not
-matter (a limit on work, a search that is judged afterwards).
+leaves a refusal out. In a copy of this folder the tests that ran its line when coverage was measured run until one
+fails, those first that ran the fewest lines. What survives the default tests is tried again with ``--all``, which tells
+what the tests that do not run by default are worth. A survivor need not be a defect: the change may not matter (a limit
+on work, a search that is judged afterwards).
 """
 
 from __future__ import annotations
@@ -27,13 +28,8 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
-#: What is mutated, with the folder of its tests.
-ROOMS = {
-    "ptcc_certify/checker": "tests/checker",
-    "lmi/exact": "tests/lmi",
-    "ptcc_certify/lyapunov": "tests/lyapunov",
-    "ptcc_certify/bounds": "tests/bounds",
-}
+#: What is mutated.
+ROOMS = ("ptcc_certify/checker", "lmi/exact", "ptcc_certify/lyapunov", "ptcc_certify/bounds")
 COMPARISONS = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq}
 OPERATORS = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Add, ast.FloorDiv: ast.Mult, ast.Div: ast.Mult}
 EXTREMES = {"min": "max", "max": "min"}
@@ -62,38 +58,59 @@ def _needs(node: Any) -> bool:
     return isinstance(call, ast.Call) and ast.unparse(call.func).startswith("need")
 
 
-def mutant(path: Path, choose: random.Random) -> tuple[str, bytes]:
-    """Return what one change of a module is, and the text that it leaves: all else is as it was."""
+def mutant(path: Path, choose: random.Random) -> tuple[str, bytes, range]:
+    """Return what one change of a module is, the text that it leaves, and its lines from its statement on."""
     text = path.read_bytes()
-    node, kind, new = choose.choice([(node, *change) for node in ast.walk(ast.parse(text)) for change in changes(node)])
+    tree = ast.parse(text)
+    node, kind, new = choose.choice([(node, *change) for node in ast.walk(tree) for change in changes(node)])
     words = "pass" if kind == "refusal" else f"({ast.unparse(new)})"
     lines = text.splitlines(keepends=True)
     begin, end = (
         sum(map(len, lines[: row - 1])) + column
         for row, column in ((node.lineno, node.col_offset), (node.end_lineno, node.end_col_offset))
     )
+    around = (s for s in ast.walk(tree) if isinstance(s, ast.stmt) and s.lineno <= node.lineno <= (s.end_lineno or 0))
+    statement = max(around, key=lambda s: s.lineno)
     told = f"{kind}: line {node.lineno}: {ast.unparse(node)[:60]} -> {words[:60]}"
-    return told, text[:begin] + words.encode() + text[end:]
+    return told, text[:begin] + words.encode() + text[end:], range(statement.lineno, node.end_lineno + 1)
 
 
-def tests_of(module: Path, room: str, count: int) -> list[str]:
-    """Return the module, for its doctests, and the test files nearest to it: they name it, or are of its room."""
-    word = re.compile(rf"\b{module.stem}\b" if module.stem != "__init__" else rf"\b{module.parent.name}\b")
-    texts = {path: path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("test_*.py")}
-    of_room = {path for path in texts if path.is_relative_to(ROOT / ROOMS[room])}
-    rank = {path: (len(word.findall(text)) > 0) + (path in of_room) for path, text in texts.items()}
-    near = sorted((path for path in texts if rank[path]), key=lambda path: (-rank[path], len(texts[path])))
-    return [str(path.relative_to(ROOT)) for path in (module, *near[:count])]
+class Coverage:
+    """Which tests ran a line, those first that ran the fewest lines of all, from a file of coverage with contexts."""
+
+    def __init__(self, path: Path):
+        from coverage import CoverageData
+
+        data = CoverageData(str(path))
+        data.read()
+        size = Counter[str]()
+        self.tests: dict[str, dict[int, set[str]]] = {}
+        for name in data.measured_files():
+            of_line = data.contexts_by_lineno(name).items()
+            lines = {line: {context.partition("|")[0] for context in of} - {""} for line, of in of_line}
+            for tests in lines.values():
+                size.update(tests)
+            self.tests[name] = lines
+        self.rank = {test: k for k, test in enumerate(sorted(size, key=lambda test: (size[test], test)))}
+
+    def near(self, module: Path, rows: range, count: int) -> list[str]:
+        """Return of the tests of some lines, or of the module where none is told, the first ones and some others."""
+        (lines,) = (lines for name, lines in self.tests.items() if Path(name).as_posix().endswith(f"/{module}"))
+        found = set[str]().union(*(lines.get(row, ()) for row in rows)) or set[str]().union(*lines.values())
+        order = sorted(found, key=self.rank.__getitem__)
+        first, rest = order[: count // 2], order[count // 2 :]
+        more = min(len(rest), count - len(first))
+        return [*first, *(rest[k * len(rest) // more] for k in range(more))]
 
 
 def killed(folder: Path, tests: list[str], minutes: float, *options: str) -> str:
-    """Run tests until one fails; return which, or that they took too long, or nothing."""
+    """Run tests until one fails; return which, or nothing, also where they took too long."""
     words = [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider", *options, *tests]
     environment = {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": ""}
     try:
         done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, timeout=60 * minutes)
     except subprocess.TimeoutExpired:
-        return "time"
+        return ""
     failed = re.findall(r"^(?:FAILED|ERROR) (.*?)(?: - .*)?$", done.stdout, re.M)
     return "" if done.returncode in (0, 5) else (failed or ["collection"])[0]
 
@@ -101,23 +118,28 @@ def killed(folder: Path, tests: list[str], minutes: float, *options: str) -> str
 def main() -> None:
     """Make mutants, run their tests, print the shares."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--coverage", type=Path, default=ROOT / ".coverage")
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--files", type=int, default=6, help="test files of each mutant")
-    parser.add_argument("--minutes", type=float, default=10, help="after which a run of tests counts as killed")
+    parser.add_argument("--part", default="0/1", help="K/N: every N-th of them, from the K-th on")
+    parser.add_argument("--tests", type=int, default=120, help="of each mutant, at most")
+    parser.add_argument("--minutes", type=float, default=2, help="after which a run of tests ends")
     given = parser.parse_args()
-    choose, count = random.Random(given.seed), Counter[str]()
+    choose, count, measured = random.Random(given.seed), Counter[str](), Coverage(given.coverage)
+    part, parts = map(int, given.part.split("/"))
     with tempfile.TemporaryDirectory() as base:
         folder = Path(base, "copy")
         shutil.copytree(ROOT, folder, ignore=shutil.ignore_patterns(".git", "*.vo*", "*.glob", ".*_cache", "notebooks"))
         for number in range(given.count):
-            room = choose.choice(list(ROOMS))
+            room = choose.choice(ROOMS)
             modules = sorted(path for path in (ROOT / room).rglob("*.py") if not path.stem.startswith("__"))
             module = choose.choices(modules, [path.stat().st_size for path in modules])[0]
-            told, text = mutant(module, choose)
+            told, text, rows = mutant(module, choose)
+            if number % parts != part:
+                continue
             begin, path = time.monotonic(), folder / module.relative_to(ROOT)
             path.write_bytes(text)
-            tests = tests_of(module, room, given.files)
+            tests = measured.near(module.relative_to(ROOT), rows, given.tests)
             by = killed(folder, tests, given.minutes)
             more = "" if by else killed(folder, tests, given.minutes, "--all")
             shutil.copy2(module, path)
@@ -125,7 +147,7 @@ def main() -> None:
             count[verdict] += 1
             seconds, test = time.monotonic() - begin, f"  by {by or more}" if by or more else ""
             print(f"{number:3d} {seconds:5.0f} s {verdict:<17} {module.relative_to(ROOT)} {told}{test}", flush=True)
-    print(", ".join(f"{verdict}: {number} of {given.count}" for verdict, number in count.most_common()))
+    print(", ".join(f"{verdict}: {number} of {count.total()}" for verdict, number in count.most_common()))
 
 
 if __name__ == "__main__":
