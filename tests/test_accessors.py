@@ -44,6 +44,7 @@ BY_LABEL: dict[str, Callable[[], Callable[[Any], Any]]] = {
 }
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("accessor", [*BY_PLACE_TOO, *BY_LABEL])
 def test_labels_count_and_unknown_agents_are_refused(accessor: str) -> None:
     get = (BY_PLACE_TOO | BY_LABEL)[accessor]()

@@ -43,6 +43,7 @@ def given(document: dict[str, Any]) -> dict[tuple[str, str], dict[str, Any]]:
     return {(step["kind"], step["of"]): needed for step, needed in brought if needed}
 
 
+@pytest.mark.few(20)
 @pytest.mark.parametrize("name", NAMES)
 def test_the_check_lays_down_the_proof_from_obligations_in_any_order(name: str):
     document, _ = read_and_check(HERE / f"{name}.json")

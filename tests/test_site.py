@@ -73,6 +73,7 @@ def test_no_line_of_a_formula_begins_like_a_point_of_a_list(page: Path):
     assert [formula for formula in formulas if re.search(r"\n([-+*]|\d+[.)]) ", formula)] == []
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("page", ["guide/answer.md", "guide/input.md", "guide/agents.md"])
 def test_transcripts_are_what_ptcc_prints(page: str):
     assert check_transcripts((ROOT / "docs" / page).read_text(encoding="utf-8"))
@@ -120,6 +121,7 @@ def built(folder: Path, text: str) -> tuple[str, str]:
     return (folder / "out" / "index.html").read_text(encoding="utf-8"), warnings.getvalue()
 
 
+@pytest.mark.few(0)
 def test_formulas_are_drawings_with_a_name(tmp_path: Path):
     page, warnings = built(tmp_path, r"The rate :math:`\lambda_{\min}(A)` and ``x``." + "\n\n.. math:: x' = -A x")
     assert not warnings
@@ -127,6 +129,7 @@ def test_formulas_are_drawings_with_a_name(tmp_path: Path):
     assert r'aria-label="\lambda_{\min}(A)"' in page and "currentColor" in page
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("text", "warning"),
     [

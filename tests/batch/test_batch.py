@@ -102,7 +102,7 @@ CLASSES = [
 ]
 
 
-@pytest.mark.few(6)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("connectivity", "balanced", "undirected"), CLASSES)
 def test_graphs_are_of_their_class(connectivity: str, balanced: bool, undirected: bool):
     for degree in (0, 2.5, 1000):
@@ -137,6 +137,7 @@ def test_graphs_are_of_their_class(connectivity: str, balanced: bool, undirected
                 assert all(picture[b][a]["weight"] == w for a, b, w in picture.edges(data="weight"))
 
 
+@pytest.mark.few(0)
 def test_a_graph_depends_on_the_seed_and_its_number_alone():
     few, many = (Ensemble(count=n, nodes=(5, 9), seed=3) for n in (4, 400))
     assert [few.graph(i) for i in range(4)] == [many.graph(i) for i in (3, 2, 1, 0)][::-1]
@@ -284,6 +285,7 @@ def test_a_row_is_what_certify_says(options: tuple[str, ...], graph: str):
     assert (row["reaching_time"] is not None) == ("sliding-mode" in options)
 
 
+@pytest.mark.few(0)
 def test_columns_are_documented_and_of_their_types():
     rows = quickly(["fig1a", TRIANGLE, Ensemble(count=8, nodes=5)], simulation=True, expect="stability")
     assert all(list(row) == list(COLUMNS) for row in rows)
@@ -296,6 +298,7 @@ def test_columns_are_documented_and_of_their_types():
     assert {name: kinds[kind] for name, kind in documented if kind in kinds} == COLUMNS
 
 
+@pytest.mark.few(0)
 def test_a_row_depends_on_its_graph_alone():
     Path("spec.toml").write_text(SPEC)
     ensemble = Ensemble.read("spec.toml")
@@ -496,6 +499,7 @@ def test_a_worker_ends_native_code_at_a_time_limit(monkeypatch: pytest.MonkeyPat
     assert row["process"] != os.getpid()
 
 
+@pytest.mark.few(0)
 def test_a_script_without_a_main_part_is_told_so(tmp_path: Path):
     pytest.importorskip("distributed", "2026.8", "before, Dask starts for ever what fails to start")
     call = f"certify_many(['fig1a', 'fig1b'], {PROTOCOL!r}, method='perron', workers=2)"
@@ -518,6 +522,7 @@ def test_uncertain_weights_of_many_graphs_are_refused_with_the_way_round():
     assert run.code == 2 and run.err.endswith("of many graphs certify each: ptcc certify GRAPH --uncertainty\n")
 
 
+@pytest.mark.few(0)
 def test_csv_and_parquet_hold_the_same():
     from pyarrow import parquet
 
@@ -535,6 +540,7 @@ def test_csv_and_parquet_hold_the_same():
     assert again == facts(rows)
 
 
+@pytest.mark.few(0)
 def test_a_graph_that_is_named_twice_has_one_row():
     write_graph(TRIANGLE, "a.csv")
     rows = quickly(["a.csv", "*.csv", "./a.csv", "fig1a", "fig1a", "spec.toml", "spec.*"])
@@ -543,6 +549,7 @@ def test_a_graph_that_is_named_twice_has_one_row():
     assert [row["graph"] for row in rows] == ["a.csv", *(f"spec.toml#{i}" for i in range(8))]
 
 
+@pytest.mark.few(0)
 def test_graphs_are_read_alike_however_they_are_given():
     Path("rated.csv").write_text("a,b,1\nb,c,-2\nc,b,1\n")
     edges = [("a", "b", 1), ("b", "c", -2), ("c", "b", 1)]
@@ -574,6 +581,7 @@ def test_how_files_are_read_is_refused_where_it_has_no_effect(sources: Any, how:
         quickly(sources, **how)
 
 
+@pytest.mark.few(0)
 def test_a_file_that_is_named_like_a_graph_of_an_ensemble_has_a_row_of_its_own():
     write_graph(TRIANGLE, "spec.toml#0.csv")
     Path("spec.toml#0.csv").rename("spec.toml#0")
@@ -625,6 +633,7 @@ def test_no_name_of_a_file_breaks_a_table():
 # ---------------------------------------------------------------------- exit codes and refusals
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("options", "code", "column"),
     [
@@ -725,6 +734,7 @@ def test_an_empty_name_of_a_table_is_refused():
         quickly(TRIANGLE, output="")
 
 
+@pytest.mark.few(0)
 def test_nothing_is_said_after_a_scheduler_was_refused():
     command = [sys.executable, "-m", "ptcc_certify.cli", "batch", "fig1a", "--scheduler", "no://h:1"]
     process = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -733,6 +743,7 @@ def test_nothing_is_said_after_a_scheduler_was_refused():
     assert "no://h:1: no Dask scheduler answers" in line
 
 
+@pytest.mark.few(0)
 def test_a_batch_that_is_refused_leaves_no_journal(monkeypatch: pytest.MonkeyPatch):
     """The packages and the scheduler are asked for after the journal is locked."""
     write_graph(TRIANGLE, "g.csv")
@@ -802,6 +813,7 @@ def computed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return names
 
 
+@pytest.mark.few(0)
 def test_an_interrupted_batch_goes_on_with_what_is_missing(computed: list[str]):
     whole = quickly("spec.toml")
     journal = begin(3)
@@ -815,6 +827,7 @@ def test_an_interrupted_batch_goes_on_with_what_is_missing(computed: list[str]):
     assert not journal.exists()
 
 
+@pytest.mark.few(0)
 def test_a_journal_may_be_torn_at_any_byte(monkeypatch: pytest.MonkeyPatch):
     """Whatever the rows are; these are empty."""
     computed: list[str] = []
@@ -839,6 +852,7 @@ def test_a_journal_may_be_torn_at_any_byte(monkeypatch: pytest.MonkeyPatch):
         assert computed == everything[kept:] and [row["graph"] for row in rows] == everything
 
 
+@pytest.mark.few(0)
 def test_a_complete_journal_only_wants_its_table_written(computed: list[str]):
     begin(8)
     computed.clear()
@@ -880,6 +894,7 @@ def test_a_damaged_journal_is_refused():
             quickly("spec.toml", output="t.csv")
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("more", "says"),
     [
@@ -898,6 +913,7 @@ def test_other_settings_than_the_journals_are_refused(more: dict[str, Any], says
     assert journal.read_bytes() == before
 
 
+@pytest.mark.few(0)
 def test_other_settings_than_the_journals_are_taken_when_the_batch_starts_again():
     begin(3)
     assert len(quickly(["spec.toml", "fig1a"], output="t.csv", restart=True, seed=1, min_rate=2)) == 9
@@ -912,6 +928,7 @@ def test_another_protocol_or_version_than_the_journals_is_refused():
         quickly("spec.toml", output="t.csv")
 
 
+@pytest.mark.few(0)
 def test_rows_are_those_of_their_graphs_whatever_the_list(computed: list[str]):
     for name in "abcdef":
         write_graph(SignedDigraph.from_edges([(1, 2, 1), (2, 1, -"abcdef".index(name) - 1)]), f"{name}.csv")
@@ -933,6 +950,7 @@ def test_rows_are_those_of_their_graphs_whatever_the_list(computed: list[str]):
     assert len(quickly(["spec.toml", "a.csv"], output="t.csv")) == 9 and computed[-1] == "spec.toml#7"
 
 
+@pytest.mark.few(0)
 def test_graphs_from_python_keep_their_rows_wherever_they_stand(computed: list[str]):
     pair, turned = SignedDigraph.from_edges([("a", "b", 1)]), SignedDigraph.from_edges([("a", "b", 1)], ["b", "a"])
     assert pair == turned and pair.labels != turned.labels
@@ -959,6 +977,7 @@ def test_files_that_have_changed_are_computed_again(computed: list[str]):
     assert [(row["nodes"], row["error"]) for row in rows] == [(3, None), (3, None), (2, None), (3, None)]
 
 
+@pytest.mark.few(0)
 def test_a_table_is_replaced_only_if_asked(computed: list[str]):
     quickly("spec.toml", output="t.csv")
     before = Path("t.csv").read_bytes()
@@ -1007,6 +1026,7 @@ def test_two_batches_do_not_share_a_journal():
     assert len(said) == 1 and "another process" in said[0]
 
 
+@pytest.mark.few(0)
 def test_ctrl_c_keeps_the_rows_and_says_so(monkeypatch: pytest.MonkeyPatch):
     row = backends.certified_row
 
@@ -1040,6 +1060,7 @@ def test_without_a_file_the_rows_so_far_are_printed(monkeypatch: pytest.MonkeyPa
     assert run.err == "ptcc: interrupted; 4 of 8 rows are printed; with -o FILE.csv the same command could go on\n"
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
 def test_a_failure_leaves_the_table_so_far_and_says_how_it_goes_on(suffix: str, monkeypatch: pytest.MonkeyPatch):
     append = batch.Journal.append
@@ -1064,6 +1085,7 @@ def test_a_failure_leaves_the_table_so_far_and_says_how_it_goes_on(suffix: str, 
     assert run.code == 0 and "5 of 8 rows were there already" in run.err
 
 
+@pytest.mark.few(0)
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 @pytest.mark.parametrize(
     ("number", "workers"),
@@ -1124,6 +1146,7 @@ def killed() -> Iterator[Callable[[list[str], Path, int, int], Any]]:
             process.kill()
 
 
+@pytest.mark.few(0)
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 def test_a_killed_batch_loses_nothing_and_does_nothing_twice(killed: Any, computed: list[str]):
     Path("many.toml").write_text(TINY.replace("8", "20"))
@@ -1141,6 +1164,7 @@ def test_a_killed_batch_loses_nothing_and_does_nothing_twice(killed: Any, comput
     assert not journal.exists()
 
 
+@pytest.mark.few(0)
 @pytest.mark.skipif(os.name != "posix", reason="process groups of POSIX")
 @pytest.mark.parametrize("delay", thinned([0.6, 0, 0.15]))
 def test_ctrl_c_while_processes_start_is_one_line(delay: float):

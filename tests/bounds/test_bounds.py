@@ -120,6 +120,7 @@ def judge(name: str, kwargs: dict, seed: int, method: str = "best") -> Judged:
     return Judged(worst, farthest, cert.comparison.worst_ratio if cert.comparison else 0.0, gap)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("name", "kwargs"), class_cases(KINDS[1::7]))
 def test_bounds_hold_for_exact_and_integrated_trajectories(name: str, kwargs: dict):
     seen = judge(name, kwargs, seed=11)
@@ -260,6 +261,7 @@ def test_the_residual_is_what_the_bound_leaves():
     )
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", ["norm_factor", "bound", "deviation", "deviation_norm"])
 def test_the_clock_alone_bounds_nothing_in_a_reaching_phase(name: str):
     """What moves the agents until ``T_r`` is the sliding variables, of which the clock knows nothing."""

@@ -74,6 +74,7 @@ def largest_input(gain: Gain, alpha: Fraction, pull: Fraction, x: Fraction, v: F
     return float(np.abs(eta**2 * (-(a + theta) * L * y[0] - (L + a) * y[1])).max())
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("first", [0, pytest.param(40, marks=pytest.mark.campaign)])
 def test_the_input_of_one_agent_stays_within_its_bound_and_comes_near(first: int):
     """Its own Lyapunov function: ``V = x^2``, of rate ``2 pull``, ``e^2 = pull^2 V``."""

@@ -41,7 +41,7 @@ def small_delays(cert: Certificate, probe: LateMessages) -> SmallDelayBounds:
     return SmallDelayBounds(LateCase(cert.structure, PROTOCOL, probe, *known))
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("own", [False, True])
 def test_delays_of_a_whole_graph_are_certified_that_are_five_times_as_long_as_those_of_its_functions(own: bool) -> None:
     probe = LateMessages("0.001", own_delay=own, gain_cap=CAP)
@@ -55,6 +55,7 @@ def test_delays_of_a_whole_graph_are_certified_that_are_five_times_as_long_as_th
     assert (found.late.longest_delay or 0) > delay
 
 
+@pytest.mark.few(0)
 def test_less_is_left_at_the_deadline_than_by_the_functions_where_both_prove_something() -> None:
     messages = LateMessages("0.0002", own_delay=True, gain_cap=CAP)
     late = certify_words(TEAM, PROTOCOL, [3, 1, 2, -4, 5], messages=messages, simulation=False).late
@@ -63,6 +64,7 @@ def test_less_is_left_at_the_deadline_than_by_the_functions_where_both_prove_som
     assert late.largest < float(max(late.form.residual))
 
 
+@pytest.mark.few(0)
 def test_what_a_certificate_says_of_it_is_read_back(tmp_path: Path) -> None:
     messages = LateMessages("0.002", own_delay=True, gain_cap=CAP)
     cert = certify_words(TEAM, PROTOCOL, [3, 1, 2, -4, 5], messages=messages, simulation=False)
@@ -74,6 +76,7 @@ def test_what_a_certificate_says_of_it_is_read_back(tmp_path: Path) -> None:
     assert found.largest == made.largest
 
 
+@pytest.mark.few(0)
 def test_the_longest_delay_for_a_wanted_residual_is_sought_by_it_too() -> None:
     graph, start = analyse(TEAM), [Fraction(k) for k in (3, 1, 2, -4, 5)]
     cert = certify_words(TEAM, PROTOCOL, start, simulation=False)
@@ -85,7 +88,7 @@ def test_the_longest_delay_for_a_wanted_residual_is_sought_by_it_too() -> None:
     assert longest.largest <= 1
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("seed", range(8))
 def test_no_delay_is_forgiven_at_which_a_constant_gain_diverges(seed: int) -> None:
     graph, _ = grouped_graph(np.random.default_rng(seed), 1 + seed % 3)
@@ -102,6 +105,7 @@ def test_leaders_that_rest_are_forgiven_any_delay() -> None:
     assert 0 < bounds(star, "0.001", True).longest_delay() < math.inf
 
 
+@pytest.mark.few(0)
 def test_of_a_larger_team_the_first_function_is_taken_and_forgives_longer_delays_than_those_of_the_graph() -> None:
     edges = [(k, (k + step) % 23, sign) for k in range(23) for step, sign in ((1, 1), (5, 2), (7, -1))]
     graph, x0 = SignedDigraph.from_edges(edges), [k % 7 - 3 for k in range(23)]
@@ -122,6 +126,7 @@ def test_what_a_state_at_rest_leaves_is_nothing() -> None:
     assert found is not None and not any(found[0].residual)
 
 
+@pytest.mark.few(0)
 def test_small_weights_and_large_ones_scale_as_the_clock_does() -> None:
     edges = [(1, 2, 1), (2, 1, 2), (2, 3, -1)]
     one = bounds(SignedDigraph.from_edges(edges), "0.001", True).longest_delay()

@@ -86,6 +86,7 @@ def test_no_deviation_bound_exceeds_the_largest_deviation_at_the_start(name: str
     assert np.array_equal(read_certificate(tmp_path / "c.json").deviation_bound(REMAINING), bounds)
 
 
+@pytest.mark.few(0)
 def test_the_deviation_bound_is_above_the_exact_motion_and_at_half_time_it_says_something():
     """One chain of transients, in balls: with the largest deviation at the start the bound is at most five times it."""
     before, flint.ctx.prec = flint.ctx.prec, BITS
@@ -102,6 +103,7 @@ def test_the_deviation_bound_is_above_the_exact_motion_and_at_half_time_it_says_
         flint.ctx.prec = before
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("disturbance", thinned(["worst-case", "sin(5*k*t)"]))
 def test_sliding_variables_move_no_agent_farther_than_they_are_large_together(disturbance: str):
     """``max_k |x_k(0) - x_k(T)| + sum_k |sigma_k(0)|`` is never exceeded, by any run, and the bound knows it."""
@@ -131,6 +133,7 @@ def test_the_vector_norm_of_deviations_is_bounded_by_their_largest_entry():
 # ---------------------------------------------------------------------- a Lyapunov function for deviations
 
 
+@pytest.mark.few(0)
 def test_a_function_for_deviations_changes_no_rate_and_improves_their_bound(monkeypatch: pytest.MonkeyPatch):
     cert = slow()
     monkeypatch.setattr(search_functions, "_for_deviations", lambda *args: None)
@@ -143,6 +146,7 @@ def test_a_function_for_deviations_changes_no_rate_and_improves_their_bound(monk
     assert (worst[0] <= worst[1]).all() and (worst[1] / worst[0]).max() > 1.5
 
 
+@pytest.mark.few(0)
 def test_the_packaged_graphs_keep_their_rates(monkeypatch: pytest.MonkeyPatch):
     graphs = [load_graph(name) for name in ("fig1a", "fig1b", "fig3a", "fig5b")]
     with_it = [certify(g, NOMINAL, asks=Asks(method="full", simulation=False)) for g in graphs]
@@ -178,6 +182,7 @@ def signed(document: dict[str, Any]) -> dict[str, Any]:
     return {**document, "digest": digest(document)}
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("large", "stdlib"), thinned([(False, False), (False, True), (True, True), (True, False)], 3))
 def test_a_constant_lowered_by_a_millionth_is_rejected(large: bool, stdlib: bool):
     """Of the agent, and of the norm, of every member; in a small graph and, one of the two, in one beyond it."""
@@ -253,6 +258,7 @@ def test_nothing_is_bounded_by_a_matrix_that_is_not_definite():
 # ---------------------------------------------------------------------- limits of the gain
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("actuator", thinned([GainLimits(gain_cap="0.01"), GainLimits(stop_before="0.999")]), ids=str)
 def test_what_a_limited_gain_leaves_is_capped_by_the_start_and_the_check_knows_it(actuator: GainLimits):
     """A gain that hardly acts: every agent is as far from its final state as it was, and no farther."""

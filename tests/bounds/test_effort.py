@@ -193,7 +193,7 @@ def judge(graph: SignedDigraph, seed: int, overs: Sequence[Fraction] = OVER) -> 
     return ratios
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("name", "kwargs"), class_cases(KINDS[::6]))
 def test_no_input_of_any_class_is_above_its_bounds(name: str, kwargs: dict):
     number = list(CLASSES).index(name)
@@ -223,6 +223,7 @@ def test_no_input_of_hundreds_of_graphs_is_above_its_bounds():
     assert len(ratios) > 1000
 
 
+@pytest.mark.few(0)
 def test_bounds_hold_for_cvodes_too():
     """The same against the integrator, whose instants and digits are others."""
     for number in (1, 2):
@@ -251,7 +252,7 @@ POWERS = (F(1, 2), F(1), F(5, 2))
 SLIDING = ("1.1", "1.2", "2.1 K=1", "2.2", "3.1 mixed", "3.2", "disconnected mixed")
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("name", "power"), thinned([(name, power) for name in SLIDING for power in POWERS], 8))
 def test_no_input_of_the_sliding_mode_is_above_its_bounds(name: str, power: Fraction):
     rng = np.random.default_rng(len(name))
@@ -330,6 +331,7 @@ def test_the_energy_is_infinite_up_to_half_the_threshold():
         assert cert.effort is not None and (cert.effort.energy is not None) == finite
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("slides", [False, True])
 def test_a_forged_integral_of_the_energy_is_rejected(slides: bool):
     graph = load_graph("fig3a")
@@ -361,6 +363,7 @@ def test_a_forged_integral_of_the_energy_is_rejected(slides: bool):
 # ---------------------------------------------------------------------- held gains
 
 
+@pytest.mark.few(0)
 def test_every_short_period_is_certified_and_a_longer_one_is_told_which_is():
     """The gain of the last periods is ``k/h`` and more; ``||E||`` is to be no larger at the deadline than at first."""
     graph, x0 = load_graph("fig3a"), [-4, 3, -1, 2, -2, 5]
@@ -414,6 +417,7 @@ def small_graphs(count: int) -> list[SignedDigraph]:
     return made
 
 
+@pytest.mark.few(0)
 def test_the_input_stays_bounded_from_the_threshold_on():
     graphs = small_graphs(80)
     assert len(graphs) >= 70
@@ -549,7 +553,7 @@ def test_limited_gains_leave_no_more_than_certified_on_hundreds_of_runs():
 # ---------------------------------------------------------------------- disturbances of the nominal protocol
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", thinned(["1.2", "1.1", "3.1 mixed", "2.1 K>=2", "disconnected mixed"]))
 def test_disturbances_add_no_more_than_certified(name: str):
     rng = np.random.default_rng(3 + len(name))
@@ -683,6 +687,7 @@ def assert_no_forgery_passes(data: dict[str, Any]) -> set[str]:
     return tried
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", thinned(["1.1", "disconnected mixed", "1.2", "3.1 mixed"]))
 def test_certificates_of_the_input_are_checked(name: str):
     data = written(nominal_certificate(name))
@@ -693,6 +698,7 @@ def test_certificates_of_the_input_are_checked(name: str):
     assert any(path.startswith("residual.clock") for path in tried)
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("push", thinned([F(1, 20), F(0)]))
 def test_certificates_of_the_sliding_input_are_checked(push: Fraction):
     data = written(sliding_certificate(push))
@@ -760,7 +766,7 @@ def test_odd_sets_limits_and_disturbances_are_refused(given: dict[str, Any]):
         certify_words(RING, NominalProtocol(1, 1, 1, 2), N3, simulation=False, **given)
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("number", thinned(EXAMPLES))
 def test_every_example_has_its_effort(number: int):
     example = EXAMPLES[number]
@@ -779,6 +785,7 @@ def test_every_example_has_its_effort(number: int):
 # ---------------------------------------------------------------------- measurement noise
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("name", "actuator"),
     thinned(

@@ -50,7 +50,7 @@ def near(weight: int, of: str = "1/5") -> tuple[Fraction, Fraction]:
     return low, high
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("n", [4, 8])
 def test_agents_in_camps_are_no_farther_from_their_value_than_from_each_other(n: int):
     edges = [(k, (k + 1) % n, *near(-1 if k % 2 else 1)) for k in range(n)]
@@ -75,6 +75,7 @@ def test_followers_of_a_large_component_are_no_farther_either():
 LED = [(0, 2, *near(2)), (1, 2, *near(-2)), (2, 3, *near(1)), (3, 4, *near(-1)), (4, 3, *near(-2))]
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("edges", "behaviour", "most"),
     [
@@ -95,6 +96,7 @@ def test_followers_of_single_leaders_are_as_near_as_their_coordinates_are_small(
     assert (bound.max(axis=0) / seen.max(axis=0)).max() < most
 
 
+@pytest.mark.few(0)
 def test_pairs_that_lead_are_no_farther_from_their_values_than_from_each_other():
     """Two groups of two leaders, a follower that weighs both, and one that hears it."""
     edges = [(0, 1, *near(1)), (1, 0, *near(2)), (2, 3, *near(-1)), (3, 2, *near(-1))]
@@ -126,6 +128,7 @@ def test_quick_followers_of_slow_agents_are_as_near_as_what_they_hear():
         assert (bound.max(axis=0) / seen.max(axis=0)).max() < most
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("sigma", [[0, 0, 0, 0, 1], [1, -1, 0, 2, 0]])
 def test_once_no_sliding_variable_moves_deviations_are_told_by_coordinates(sigma: list[int]):
     edges = [(0, 2, Fraction(1), Fraction(1)), (1, 2, Fraction(-1), Fraction(-1)), *LED[2:]]

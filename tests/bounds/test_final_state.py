@@ -47,6 +47,7 @@ def projection(made: Made) -> list[list[Fraction]]:
     return [[Fraction(q.row(i).get(j, 0)) for j in range(n)] for i in range(n)]
 
 
+@pytest.mark.few(0)
 @given(made_graphs(max_nodes=9))
 def test_q_is_the_projection_onto_the_kernel_along_the_range(made: Made):
     """L Q = Q L = 0 and Q Q = Q, in rationals, and rank Q is the number of balanced closed components."""
@@ -62,6 +63,7 @@ def test_q_is_the_projection_onto_the_kernel_along_the_range(made: Made):
     assert sum(Q[i][i] for i in range(n)) == sum(balanced for _, balanced in made.closed)
 
 
+@pytest.mark.few(0)
 @given(made_graphs(max_nodes=9), SEEDS)
 def test_the_final_state_is_the_limit_of_the_motion(made: Made, seed: int):
     x0 = start(seed, made.graph.n_nodes)
@@ -77,6 +79,7 @@ def test_the_final_state_is_the_limit_of_the_motion(made: Made, seed: int):
         assert np.asarray(exact) == pytest.approx(limit, abs=1e-6 * size)
 
 
+@pytest.mark.few(0)
 @given(made_graphs(max_nodes=9), SEEDS)
 def test_the_final_state_shows_the_claimed_behaviour(made: Made, seed: int):
     x0 = start(seed, made.graph.n_nodes)
@@ -211,6 +214,7 @@ def test_the_definitions_on_states():
     assert not is_interval_bipartite_consensus([2, -3, 0], chain)
 
 
+@pytest.mark.few(0)
 @settings(max_examples=40)
 @given(made_graphs(max_nodes=6, weights=("units", "small ints")), SEEDS)
 def test_the_definitions_on_trajectories(made: Made, seed: int):

@@ -75,6 +75,7 @@ def plain(family: Family, x: list[Fraction]) -> Certificate:
     return family_certificate(family, PROTOCOL, tuple(map(ComponentProof, decide(family))), tuple(x))
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("seed", range(12))
 def test_every_signal_keeps_the_mean_of_a_circulation(seed: int):
     rng = random.Random(seed)
@@ -142,6 +143,7 @@ def test_followers_of_leaders_that_keep_their_values_end_at_a_point():
     assert certificate.final_state == tuple((Fraction(v),) * 2 for v in (1, 5, 4, 4, Fraction(-5, 2)))
 
 
+@pytest.mark.few(0)
 def test_weights_known_to_a_part_leave_the_mean_nearly_kept():
     """The ends without the mean are those of deviations of single agents; the mean narrows them to half and less."""
     rng = random.Random(2)
@@ -165,6 +167,7 @@ def stripped(part: ComponentProof) -> tuple[CommonForm, ...]:
     return tuple(replace(V, means=()) for V in part.functions if isinstance(V, CommonForm))
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("mean", "why"),
     [

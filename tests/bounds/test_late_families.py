@@ -184,7 +184,7 @@ def random_case(seed: int, by_edge: bool = False) -> Certificate:
     return certify(family, PROTOCOL, x0, **asked)  # type: ignore[no-any-return]
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("by_edge", [False, True], ids=["one delay", "edge by edge"])
 def test_no_adversary_leaves_more_than_is_certified(by_edge: bool, seed: int):
@@ -243,7 +243,7 @@ def certified(name: str, x0: tuple[int, ...] | None = (1, 2, -3)) -> Certificate
     return certify(UNSURE, PROTOCOL, x0, **BESIDE[name])  # type: ignore[no-any-return]
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("x0", [(1, 2, -3), None], ids=["state", "every state"])
 @pytest.mark.parametrize("name", BESIDE)
 def test_what_is_certified_is_read_back(name: str, x0: tuple[int, ...] | None, tmp_path: Path):
@@ -260,6 +260,7 @@ def test_what_is_certified_is_read_back(name: str, x0: tuple[int, ...] | None, t
         assert found.late.deviation_bound(t) == pytest.approx(made.late.deviation_bound(t))
 
 
+@pytest.mark.few(0)
 def test_what_a_cap_leaves_bounds_runs_of_members():
     made, runs = certified("a cap"), []
     for member in ([(0, 1, 1), (1, 2, -3), (2, 1, "-0.5"), (0, 2, -1)], [(0, 1, 2), (1, 2, -1), (0, 2, -1)]):
@@ -279,6 +280,7 @@ def test_what_is_asked_of_a_family_under_a_cap_alone_is_told_of_the_cap():
         assert word not in " ".join((made.summary(), text, page)), word
 
 
+@pytest.mark.few(0)
 def test_disturbances_and_noise_of_a_family_are_those_of_followers_and_of_what_is_heard():
     limits, asks = GainLimits(gain_cap=20), Asks(delta="0.1", noise="0.01")
     noisy = certify(UNSURE, PROTOCOL, [1, 2, -3], limits=limits, asks=asks)
@@ -304,6 +306,7 @@ def test_other_limits_of_families_are_refused(more: dict[str, Any]):
         certify(Family.from_intervals([(1, 2, 1, 2), (2, 1, 1, 2)]), PROTOCOL, limits=GainLimits(gain_cap=9))
 
 
+@pytest.mark.few(0)
 def test_a_delay_that_is_not_forgiven_is_left_open_and_read_back(tmp_path: Path):
     asked = Asks(expectations=Expectations("bipartite consensus", max_residual="0.1"))
     made = certify(UNSURE, PROTOCOL, [1, 2, -3], messages=LateMessages(50, gain_cap=100), asks=asked)
@@ -368,7 +371,7 @@ def forged(name: str, path: str, value: Any) -> str | None:
     return check(data | {"digest": digest(data)}).rejected
 
 
-@pytest.mark.few(5)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("name", "path", "value"),
     [
@@ -395,6 +398,7 @@ def test_a_forged_number_is_rejected(name: str, path: str, value: str):
     assert forged(name, path, value) is not None
 
 
+@pytest.mark.few(0)
 def test_rows_hold_at_the_worst_weights_of_every_mode_alone():
     """Of two modes, each of which has a rate, none is proved by the rows of the other; ``b`` above the least fails."""
     day = Family.from_intervals([("l", "a", 1, 2), ("a", "b", 5, 6)])
@@ -424,6 +428,7 @@ def test_figures_are_of_what_is_asked(tmp_path: Path):
     assert 'id="figure-late"' in page and 'id="figure-states"' not in page
 
 
+@pytest.mark.few(1)
 @pytest.mark.usefixtures("framed_figures")
 @pytest.mark.parametrize("name", ["late", "late behind leaders that move", "leaders that move"])
 def test_page_and_latex_tell_no_end_of_another_problem(name: str, tmp_path: Path):
@@ -443,6 +448,7 @@ def test_page_and_latex_tell_no_end_of_another_problem(name: str, tmp_path: Path
     assert saved.to_pandas()["keeps"].tolist() == [not made.leaders_move, False, False]
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("name", "why"),
     [

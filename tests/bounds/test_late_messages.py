@@ -120,6 +120,7 @@ def test_220_graphs_of_constant_varying_and_square_delays_keep_their_bounds(bloc
     assert max(worst) <= 1 + ROUNDING
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("seed", range(4, 7))
 def test_delays_of_single_edges_leave_no_more_than_the_largest_for_all_and_no_run_exceeds_that(seed: int) -> None:
     rng, structure, protocol, x0, ends = _case(seed)
@@ -130,6 +131,7 @@ def test_delays_of_single_edges_leave_no_more_than_the_largest_for_all_and_no_ru
     _judge_late(seed, ("oldest", "varying"), apart=True)
 
 
+@pytest.mark.few(0)
 def test_messages_of_leaders_at_rest_may_be_as_old_as_they_like() -> None:
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 2), ("c", "b", -1), ("a", "c", 1)])
     structure, protocol = analyse(graph), NominalProtocol(T=1, rho1=1, rho2=4, kappa=1)
@@ -167,11 +169,13 @@ def _judge_settling(seed: int, patterns: tuple[str, ...] = PATTERNS) -> float:
     return worst
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("seed", range(3))
 def test_no_run_behind_leaders_that_settle_exceeds_what_is_proved(seed: int) -> None:
     assert _judge_settling(seed, PATTERNS[seed : seed + 1]) <= 1 + ROUNDING
 
 
+@pytest.mark.few(0)
 def test_what_followers_hear_at_once_is_not_held_over_a_step() -> None:
     """A run whose bound is attained at all times was up to 6.5 % above it, whatever the number of steps."""
     edges = [("a", "b", 1), ("b", "a", 1), ("a", "f", 5), ("a", "g", 50)]
@@ -282,6 +286,7 @@ def test_the_lower_bound_of_what_is_missed_is_kept_on_200_graphs() -> None:
     assert _judge_missed(range(2000, 2200)) >= 50
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("seed", range(2))
 def test_agents_with_deadlines_one_delay_apart_are_at_their_final_states_exactly(seed: int) -> None:
     _, structure, protocol, x0, ends = _case(seed, acyclic=True)
@@ -315,6 +320,7 @@ def test_levels_are_longest_paths_from_leaders_and_a_cycle_has_none(seed: int) -
     assert found.tolist() == longest
 
 
+@pytest.mark.few(0)
 def test_levels_of_many_followers_are_found_along_every_edge_once() -> None:
     chain = FollowerRows(analyse(SignedDigraph.from_edges([(k, k + 1, 1) for k in range(20_000)])))
     found = levels(chain)
@@ -540,6 +546,7 @@ def _largest_share(seeds: Iterator[int] | range) -> list[float]:
     return worst
 
 
+@pytest.mark.few(0)
 def test_no_input_of_a_run_is_above_its_bound_under_a_capped_gain() -> None:
     """The input is that of what agents hear, at every instant of runs as late as allowed, and now late, now not."""
     assert max(_largest_share(range(3))) > 0.3  # the bound is not idle
@@ -566,6 +573,7 @@ def test_the_largest_gain_under_a_decay_is_where_it_comes_to_a_cap() -> None:
         assert seen * (1 - 1e-4) <= bound <= seen * (1 + 2e-3)
 
 
+@pytest.mark.few(0)
 def test_without_a_cap_no_input_is_bounded() -> None:
     _, structure, protocol, x0, _ = _case(4)
     for messages in (LateMessages(delay="0.01"), LateMessages(value_error="0.1")):
@@ -639,6 +647,7 @@ def _flight_ratio(seed: int, pattern: int, apart: bool = False) -> tuple[float, 
     return max(float((away / bounds.deviation_bound(motion.times)).max()), last), last
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("pattern", "part"), thinned((pattern, part) for pattern in range(4) for part in range(4)))
 def test_64_graphs_whose_leaders_flee_while_messages_are_late_keep_their_bounds(
     pattern: int, part: int, monkeypatch: pytest.MonkeyPatch
@@ -663,6 +672,7 @@ def test_240_graphs_whose_leaders_flee_while_messages_are_late_keep_their_bounds
     assert ratios.max() <= 1 + ROUNDING
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("seed", thinned(range(3000, 3012), 3))
 def test_runs_of_the_package_behind_fleeing_leaders_keep_the_bounds(seed: int) -> None:
     structure, protocol, messages, leaders, x0, ends = _both(seed)
@@ -678,6 +688,7 @@ def test_runs_of_the_package_behind_fleeing_leaders_keep_the_bounds(seed: int) -
     assert moved.max() <= 1e-12 and ("target(" in run.to_csv().split("\n")[0])
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("seed", thinned(range(8), 3))
 def test_without_speed_and_disturbance_nothing_changes(seed: int) -> None:
     structure, protocol, messages, _, x0, ends = _both(4000 + seed, apart=seed % 2 == 0)
@@ -695,6 +706,7 @@ def test_without_speed_and_disturbance_nothing_changes(seed: int) -> None:
         np.testing.assert_array_equal(still.input, moving.input)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("seed", thinned(range(8)))
 def test_with_ever_shorter_delays_the_bound_comes_to_that_of_tracking(seed: int) -> None:
     """At ``T`` nothing is left in the limit, and before it no more than by rows at once."""
@@ -746,6 +758,7 @@ def test_what_no_gain_takes_away_stays_below_the_bound_and_above_nothing() -> No
     assert bound_late(LateCase(structure, strong, LateMessages(Fraction(1, 50)))).never_below is None
 
 
+@pytest.mark.few(0)
 def test_late_messages_and_leaders_that_move_are_saved_and_read() -> None:
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 2), ("c", "b", -1)])
     protocol, leaders = NominalProtocol(T=1, rho1=1, rho2=3, kappa=1), MovingLeaders("1/2", "1/5")
@@ -799,6 +812,7 @@ def test_the_longest_delay_behind_leaders_that_move_is_certified() -> None:
     assert bound_late(LateCase(structure, protocol, again, x0, ends)).largest <= 0.05
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("cap", "speed"), thinned([(None, None), (100, None), (None, "1/2"), (100, "1/2")], 3))
 def test_a_clock_that_goes_very_far_leaves_what_can_be_written(speed: str | None, cap: int | None) -> None:
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1), ("c", "b", 2)])
@@ -893,6 +907,7 @@ def test_limits_that_limit_nothing_are_refused_beside_messages_too(limits: Any, 
         certify(chain, NominalProtocol(), limits=limits, **beside)
 
 
+@pytest.mark.few(0)
 def test_leaders_are_told_by_messages_or_beside_them() -> None:
     chain, leaders = SignedDigraph.from_edges([(1, 2, 1)]), MovingLeaders(speed=1)
     asks, messages = Asks(simulation=False, method="paper"), LateMessages("0.01", leaders=leaders)

@@ -68,7 +68,7 @@ def deviations(part: AgentsPart | CascadePart) -> tuple[np.ndarray, np.ndarray]:
     return q, scaled * eta ** np.arange(part.order)[:, None] * np.exp(-run.rate * run.clock[known] / 2)
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("graph", "kind"), thinned(CASES, 3))  # every kind once, by turns on every graph
 def test_bounds_are_above_the_motion_and_at_99_percent_within_ten_times_of_it(graph: str, kind: str):
     part = part_of(made(graph, kind))
@@ -82,7 +82,7 @@ def test_bounds_are_above_the_motion_and_at_99_percent_within_ten_times_of_it(gr
     assert (bound <= without).all() and np.linalg.norm(bound[:, 0, at]) < np.linalg.norm(without[:, 0, at])
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("kind", KINDS)
 def test_agents_are_where_they_are_enclosed(kind: str):
     """The motion in original coordinates, by an explicit integrator of high order."""
@@ -130,7 +130,7 @@ def less(rows: list[Any], i: int) -> list[Any]:
     return rows
 
 
-@pytest.mark.few(8)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("kind", ["at rest", "cascade"])
 @pytest.mark.parametrize(
     ("change", "reason"),
@@ -156,6 +156,7 @@ def test_instants_that_are_not_told_are_not_proved(kind: str):
     assert not report.accepted and report.rejected != "digest"
 
 
+@pytest.mark.few(0)
 @every(3)
 @pytest.mark.parametrize("kind", ["at rest", "cascade"])
 def test_no_root_of_an_instant_is_less_than_it_is(kind: str, every: int):
@@ -170,6 +171,7 @@ def test_no_root_of_an_instant_is_less_than_it_is(kind: str, every: int):
         assert check(changed(smaller, kind)).reason == "a Lyapunov function is larger at an instant"
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("kind", ["at rest", "cascade"])
 def test_instants_are_accepted_and_read_back_whole_or_in_part(kind: str):
     certificate = made("camps", kind)
@@ -194,6 +196,7 @@ def test_instants_stand_beside_agents_of_order_n_without_a_cap_alone():
         assert not check(resealed({**document, "instants": instants})).accepted
 
 
+@pytest.mark.few(0)
 def test_agents_in_agreement_have_none_and_large_teams_as_many_as_little_work_allows():
     together = certify_words(CAMPS, PROTOCOL, [1, 1, -1, 1], agents=Agents(order=2), simulation=False)
     assert together.verdict == "certified" and not part_of(together).instants
@@ -202,6 +205,7 @@ def test_agents_in_agreement_have_none_and_large_teams_as_many_as_little_work_al
     assert large.verdict == "certified" and len(part_of(large).instants) < 10
 
 
+@pytest.mark.few(0)
 def test_under_the_sliding_mode_protocol_and_in_the_plane():
     protocol = SlidingModeProtocol(T_r="1/2", T_s="3/2", rho1=1, rho2=1, kappa=2)
     places = [[1, 0], [2, 5], [-4, 1], [0, 3]]

@@ -96,6 +96,7 @@ def test_bounds_hold_for_agents_of_orders_four_to_eight(seed: int):
     holds(*seen(seed, 4 + seed % 5))
 
 
+@pytest.mark.few(0)
 def test_a_run_obeys_the_equation_of_the_agents_in_time():
     agents = Agents(plant=[Fraction(1, 2), Fraction(-1, 5)], offsets=[[1], [0], [2], [-1]])
     part = made(TEAM, NOMINAL, [5, 2, 4, -1], agents, v0=[1, 0, 0, -2]).agents
@@ -112,6 +113,7 @@ def test_a_run_obeys_the_equation_of_the_agents_in_time():
     assert np.abs(told.y - ours).max() <= 1e-7
 
 
+@pytest.mark.few(0)
 def test_agents_meet_in_flight_and_fly_on_as_mirror_images():
     part = made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=2), v0=[1, 0, 0, -2]).agents
     assert part is not None and part.final_state is not None
@@ -121,6 +123,7 @@ def test_agents_meet_in_flight_and_fly_on_as_mirror_images():
     assert ends[2] == [mean, Fraction(-1)]
 
 
+@pytest.mark.few(0)
 def test_agents_meet_at_rest_where_their_own_velocity_is_damped():
     part = made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=2, rest=1), v0=[1, 0, 0, -2]).agents
     assert part is not None and part.final_state is not None and part.input is not None
@@ -138,6 +141,7 @@ def test_one_integrator_is_the_plain_certificate():
     assert same == plain and same.agents is None and "agents" not in same.document
 
 
+@pytest.mark.few(0)
 def test_one_integrator_under_a_gain_cap_is_the_plain_certificate_under_this_limit():
     plain = certify(TEAM, NOMINAL, [5, 2, 4, -1], limits=GainLimits(gain_cap=4), asks=Asks(simulation=False))
     same = certify(TEAM, NOMINAL, [5, 2, 4, -1], agents=Agents(1, gain_cap=4), asks=Asks(simulation=False))
@@ -172,7 +176,7 @@ BESIDE: dict[str, tuple[Any, dict[str, Any]]] = {
 }
 
 
-@pytest.mark.few(7)  # each once
+@pytest.mark.few(1)  # each once
 @pytest.mark.parametrize("name", BESIDE)
 @pytest.mark.parametrize("graph", [TEAM, CAMPS], ids=["team", "camps"])
 def test_single_integrators_in_a_formation_have_the_plain_certificate_of_their_places(
@@ -208,6 +212,7 @@ def test_single_integrators_in_a_formation_have_the_plain_certificate_of_their_p
     assert any("of x - offsets" in line for line in summary_lines(again, "team"))
 
 
+@pytest.mark.few(0)
 def test_bounds_of_a_formation_under_a_cap_hold_on_the_motion_that_agents_of_order_1_make():
     """The motion, in the plane, is that of agents in their places; the bound of the input is no weaker than theirs."""
     ours = in_places()
@@ -223,7 +228,7 @@ def test_bounds_of_a_formation_under_a_cap_hold_on_the_motion_that_agents_of_ord
     assert left.largest <= max(part.input) * (1 + Fraction(1, 10**9))
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", BESIDE)
 def test_runs_of_a_formation_tell_positions(name: str):
     """What is asked and the run beside the bounds begin at ``x0``, and differ from ``x - h`` by ``h`` at any time."""
@@ -248,6 +253,7 @@ def test_runs_of_a_formation_tell_positions(name: str):
                 assert table[:, 6:10] == pytest.approx(other[:, 6:10] + shift, abs=1e-12)
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("expected", ["bipartite-containment", "consensus"])
 def test_a_behaviour_under_a_cap_is_not_told_to_be_met_in_a_formation(expected: str):
     agents = Agents(order=1, offsets=[1, -3, 2, 2], gain_cap=4)
@@ -283,6 +289,7 @@ def test_in_the_plane_single_integrators_under_a_cap_keep_the_proof_of_agents_of
     assert part is not None and part.residual is not None and part.dimension == 2
 
 
+@pytest.mark.few(0)
 def test_the_initial_set_of_a_formation_is_that_of_positions():
     """All ``|x_k(0)| <= 10`` are a box about ``-h`` of what agents steer by."""
     h = [1, -3, 2, 2]
@@ -330,6 +337,7 @@ def test_places_without_positions_are_rejected_where_states_are_told(key: str):
     assert not check({k: part for k, part in data.items() if k != "formation"}).accepted
 
 
+@pytest.mark.few(0)
 def test_no_agents_of_order_n_stand_beside_a_formation():
     of_order_two = certify(TEAM, NOMINAL, [5, 2, 4, -1], agents=Agents(order=2), asks=Asks(simulation=False)).to_dict()
     formation = certify(
@@ -339,6 +347,7 @@ def test_no_agents_of_order_n_stand_beside_a_formation():
     assert report.reason == "a formation beside that of agents of order n"
 
 
+@pytest.mark.few(0)
 def test_a_formation_in_the_plane_is_bounded_by_the_function_that_needs_least_input():
     """The fastest function of this graph nearly degenerates: by it inputs were bounded by 4e7, deviations by 480."""
     graph = SignedDigraph.from_edges([("ann", "bob", 1), ("bob", "eve", -1)])
@@ -391,7 +400,7 @@ STARTED = {
 }
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("kind", STARTED)
 def test_a_limit_below_the_input_at_time_0_is_refuted_and_one_above_it_is_not(kind: str):
     import casadi as ca
@@ -456,11 +465,13 @@ def test_gains_come_near_those_in_closed_form_for_a_small_constant_gain():
         assert np.allclose(K, exact, rtol=0.02)
 
 
+@pytest.mark.few(0)
 def test_agents_of_the_largest_order_are_certified():
     certificate = made(PAIR, NOMINAL, [3, 1], Agents(order=8))
     holds(certificate, certificate.agents_comparison)
 
 
+@pytest.mark.few(0)
 def test_a_file_says_what_the_certificate_says(tmp_path: Path):
     agents = Agents(order=2, drag="0.3", offsets=[[0, 1]] * 4, gain_cap=30)
     first = made(TEAM, SLIDING, [[5, 1], [2, 2], [4, 3], [-1, 4]], agents)
@@ -474,6 +485,7 @@ def test_a_file_says_what_the_certificate_says(tmp_path: Path):
     assert summary_lines(first, "team")[4:] == summary_lines(again, "team")[4:]
 
 
+@pytest.mark.few(0)
 def test_every_number_that_bounds_something_cannot_be_smaller_for_nothing():
     document = made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=2, gain_cap=30)).to_dict()
     for change in (
@@ -508,7 +520,7 @@ def test_just_above_the_least_decay_the_input_is_told_not_to_be_certified_bounde
     assert "decay=4 bounds it" in certificate.assessment.text
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("agents", "why", "mend"),
     [
@@ -532,6 +544,7 @@ def test_the_input_at_rest_is_bounded_iff_the_common_velocity_falls_fast_enough(
     assert check(certificate.to_dict()).accepted and certificate.agents_comparison.worst <= 1 + 1e-7
 
 
+@pytest.mark.few(0)
 def test_a_bound_that_is_larger_than_the_way_of_the_agents_says_little_by_t():
     slow = Agents(order=2, decay="2.01")
     assert made(TEAM, NOMINAL, [5, 2, 4, -1], slow).assessment.useful is True
@@ -543,6 +556,7 @@ def test_a_bound_that_is_larger_than_the_way_of_the_agents_says_little_by_t():
     assert assessment.useful is False and "a larger decay, such as 8, leaves less" in assessment.text
 
 
+@pytest.mark.few(0)
 def test_the_coupling_is_not_that_of_a_fast_function_with_a_huge_overshoot_constant():
     edges = [
         ("1", "2", "0.8"),
@@ -563,15 +577,18 @@ def test_the_coupling_is_not_that_of_a_fast_function_with_a_huge_overshoot_const
     assert bounds["perron"] < 10 * bounds["paper"]
 
 
+@pytest.mark.few(0)
 def test_velocities_that_are_the_same_everywhere_are_told_once():
     certificate = made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=2, drag="0.1"))
     assert "v(T) 0, of every agent (rounded)" in told(certificate)
 
 
+@pytest.mark.few(0)
 def test_at_twice_the_order_the_input_is_bounded():
     assert "input bounded; |u_k| <=" in told(made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=2, decay=4)))
 
 
+@pytest.mark.few(0)
 def test_velocities_that_are_not_given_are_told_to_be_zero():
     assert "no velocities given: taken for 0" in made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=2)).notes
 
@@ -594,7 +611,7 @@ def test_one_agent_and_single_leaders_and_disconnected_graphs():
 DECADES = SignedDigraph.from_edges([("a", "b", "1e-30"), ("b", "a", "1e30"), ("b", "c", "-1e40"), ("c", "a", 1)])
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("graph", "agents", "answer", "claim"),
     [
@@ -650,6 +667,7 @@ def test_sliding_variables_that_begin_elsewhere_are_refused():
         certify(TEAM, NOMINAL, InitialState([5, 2, 4, -1], v0=[1, 1, 1, 1]))
 
 
+@pytest.mark.few(0)
 def test_a_faster_function_with_a_huge_constant_does_not_decide_the_coupling():
     follower = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("a", "c", -1), ("c", "a", -1), ("c", "d", 1)])
     agents, begin = Agents(order=2), {"x0": [5, 2, 4, -1], "v0": [1, 0, 0, -2]}

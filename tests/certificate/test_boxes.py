@@ -86,6 +86,7 @@ def test_agents_of_two_modes_with_other_targets_are_drawn_into_one_box():
     assert (box.lower, box.upper) == ((0,), (5,)) and certificate.verdict == "certified"
 
 
+@pytest.mark.few(0)
 def test_there_is_no_box_without_a_state_or_followers_or_where_all_come_to_rest_or_sliding_variables_move():
     assert made(MOVED, None).boxes == {}
     assert made(Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1), ("b", "c", 1, 2)]), [1, 2, 3]).boxes == {}
@@ -134,6 +135,7 @@ def mutants(boxes: Any) -> list[tuple[tuple[Any, ...], Any]]:
     return found
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("first", thinned(range(14), 14))
 def test_no_mutant_of_a_box_is_accepted_that_is_false(first: int):
     """Every fourteenth of them, from the first on."""

@@ -145,7 +145,7 @@ def ratios_where_enclosed(part: CascadePart, sizes: np.ndarray) -> np.ndarray:
         return np.where(sizes > 0, sizes / part.deviation_bound(HALVINGS), 0)
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("seed", range(160))
 def test_bounds_are_above_where_agents_are_enclosed_by_no_integrator(seed: int):
     """From the beginning, from the third instant and from every one; what is near to its bound shows that it is."""
@@ -248,6 +248,7 @@ def motion_in_full(certificate: Certificate, until: float) -> np.ndarray:
     return np.array(run.y[:, -1].reshape(2, -1))
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("graph", [TEAM, pytest.param(ENEMIES, marks=pytest.mark.campaign)], ids=["team", "enemies"])
 def test_agents_end_at_rest_where_the_final_state_says(graph: SignedDigraph):
     N = graph.n_nodes
@@ -272,6 +273,7 @@ def test_positions_settle_where_velocities_do_not():
     holds(certificate)
 
 
+@pytest.mark.few(0)
 def test_without_velocities_allies_end_where_single_integrators_do():
     """``q(0) = -eta(0) e(0)``, whose mean is 0: the same place, whatever alpha."""
     plain = certify(TEAM, FAST, [5, 2, 4, -1], asks=Asks(method="paper", simulation=False))
@@ -281,6 +283,7 @@ def test_without_velocities_allies_end_where_single_integrators_do():
         assert [end[0] for end in ends_of(certificate)] == list(plain.final_state.states)
 
 
+@pytest.mark.few(0)
 def test_agents_that_begin_with_the_commanded_velocity_move_as_single_integrators():
     x0 = [5, 2, 4, -1]
     v0 = (float(FAST.gain.first) * -(TEAM.laplacian() @ np.array(x0, dtype=float))).tolist()
@@ -310,6 +313,7 @@ def pair(rho2: Any, alpha: Any) -> Certificate:
     return made(PAIR, protocol, [3, 1], Agents(order=2, cascade=alpha), v0=[1, 2])
 
 
+@pytest.mark.few(0)
 def test_an_input_at_both_limits_is_not_claimed_to_be_bounded():
     rho2 = 4 / RATE  # rate k = 4
     both = part_of(pair(rho2, 1 / rho2))
@@ -319,7 +323,7 @@ def test_an_input_at_both_limits_is_not_claimed_to_be_bounded():
         holds(certificate)
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("rho2", "alpha", "names"),
     [
@@ -337,6 +341,7 @@ def test_what_keeps_the_input_from_being_bounded_is_told_with_its_mend(rho2: Any
     assert again.input is not None
 
 
+@pytest.mark.few(0)
 def test_alpha_that_is_half_the_rate_is_no_exception():
     certificate = pair(6, RATE / 2)
     assert part_of(certificate).best == RATE and worst_ratio(certificate) <= 1 + 1e-7
@@ -353,6 +358,7 @@ def test_one_agent_comes_to_rest_by_itself():
     holds(certificate)
 
 
+@pytest.mark.few(0)
 def test_single_leaders_and_disconnected_and_unbalanced_graphs():
     led = made(SignedDigraph.from_edges([("a", "b", -2)]), FAST, [3, 5], Agents(order=2, cascade=2), v0=[-1, 4])
     (a, _), (b, _) = ends_of(led)
@@ -397,6 +403,7 @@ def test_a_run_whose_weights_leave_float64_is_compared_as_far_as_they_go():
     assert seen is not None and 0 < seen.decay <= 1 and seen.deviations and all(0 < x <= 1 for x in seen.deviations)
 
 
+@pytest.mark.few(0)
 def test_disturbances_under_sliding_variables_move_nothing():
     sliding = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=6, kappa=1, mu1=3, delta=2)
     certificates = [
@@ -409,6 +416,7 @@ def test_disturbances_under_sliding_variables_move_nothing():
     holds(certificates[0])
 
 
+@pytest.mark.few(0)
 def test_a_file_says_what_the_certificate_says(tmp_path: Path):
     first = made(TEAM, FAST, [[5, 1], [2, 2], [4, 3], [-1, 4]], Agents(order=2, cascade=2, offsets=[[0, 1]] * 4))
     first.save(tmp_path / "c.json")
@@ -419,6 +427,7 @@ def test_a_file_says_what_the_certificate_says(tmp_path: Path):
     assert np.array_equal(one.deviation_bound(np.array([0.5])), other.deviation_bound(np.array([0.5])))
 
 
+@pytest.mark.few(0)
 def test_velocities_that_were_not_given_are_told_to_be_0():
     agents = Agents(order=2, cascade=2)
     still, moving = made(TEAM, FAST, [5, 2, 4, -1], agents), made(TEAM, FAST, [5, 2, 4, -1], agents, v0=[0, 0, 0, 1])
@@ -466,6 +475,7 @@ def test_what_is_not_proved_is_refused_with_the_reason(agents: Any, options: Any
 # ---------------------------------------------------------------------- course
 
 
+@pytest.mark.few(0)
 def test_the_course_is_above_the_solution_of_its_equations_and_near_it():
     """``R' = -b R + theta' S``, ``J' = -g J + R``, ``S = e^-G S(0) + J``, by another integrator."""
     for rho1, k, rate, alpha in ((1, 2, 3, 1), (10, 1, "0.2", "0.5"), ("0.01", 6, 2, 3), (3, 2, 7, "0.1")):
@@ -503,6 +513,7 @@ def test_eigenvalues_that_lie_far_apart_do_not_loosen_bounds_of_the_cascade():
     assert (seen <= bound * (1 + 1e-7)).all() and (bound <= 20 * seen).all()
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("agents", [Agents(order=2), Agents(order=2, cascade=2)])
 def test_bounds_of_agents_at_no_instant_up_to_the_deadline_are_refused(agents: Agents):
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)])

@@ -85,7 +85,7 @@ def precision() -> Iterator[None]:
     flint.ctx.prec = before
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", GRAPHS)
 def test_the_examples_behave_as_the_paper_reports(name: str):
     _, _, reported = select(name)[0]
@@ -105,6 +105,7 @@ def test_the_examples_behave_as_the_paper_reports(name: str):
     Recheck(through_json(cert)).everything()
 
 
+@pytest.mark.few(0)
 @pytest.mark.usefixtures("precision")
 @pytest.mark.parametrize("name", GRAPHS)
 def test_at_the_last_instant_the_run_lacks_what_the_exact_clock_leaves(name: str):
@@ -227,7 +228,7 @@ def leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
         yield path, value
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("name", "kwargs"), class_cases(KINDS[::6]))
 def test_numbers_are_exact_texts(name: str, kwargs: dict):
     data = of_class(name)
@@ -244,6 +245,7 @@ def test_numbers_are_exact_texts(name: str, kwargs: dict):
     assert seen > len(data["problem"]["graph"]["nodes"])  # each has at least its start, and there is the gain
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", [name for name, _ in CLASSES][::8])
 def test_the_edges_give_the_graph_back_whatever_their_order(name: str):
     data = of_class(name, method="paper")
@@ -302,7 +304,7 @@ def test_a_broken_certificate_is_refused(how: str, tmp_path: Path):
 # ---------------------------------------------------------------------- the proof, anew
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("name", "kwargs"), class_cases((*ROWS, "disconnected 1.1 and isolated")))
 def test_the_json_alone_proves_the_claim(name: str, kwargs: dict):
     judge = Recheck(of_class(name))
@@ -310,11 +312,13 @@ def test_the_json_alone_proves_the_claim(name: str, kwargs: dict):
     judge.digest()
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("name", "kwargs"), class_cases(("2.2",)))
 def test_the_json_alone_proves_the_claim_of_decimal_weights(name: str, kwargs: dict):
     Recheck(of_class(name, seed=4)).everything()
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("name", "kwargs"), class_cases(ROWS))
 def test_a_rate_a_millionth_higher_is_not_proved(name: str, kwargs: dict):
     """The paper's rate is that of its formula, not less: 1e-6 more fails the inequality of the row."""
@@ -563,6 +567,7 @@ def test_unknown_signs_are_refused_by_name(real_data: Path):
 # ---------------------------------------------------------------------- special starts, special graphs
 
 
+@pytest.mark.few(0)
 def test_a_degenerate_start_is_named_in_json_and_on_screen(tmp_path: Path):
     """Foes whose weighted signed mean is 0 meet at 0: bipartite consensus, but not at a positive value."""
     path = tmp_path / "g.csv"
@@ -588,6 +593,7 @@ def test_a_degenerate_start_is_named_in_json_and_on_screen(tmp_path: Path):
     assert unbalanced.to_dict()["influence"]["degenerate"] == []  # 0 is what an unbalanced group is for
 
 
+@pytest.mark.few(0)
 def test_a_disconnected_graph_has_components_and_no_claim():
     graph = SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1), (3, 4, -1), (4, 3, -1), (4, 5, 2)], [6])
     data = through_json(certify(graph, PROTOCOL, [1, 2, 3, 4, 5, 6]))
@@ -622,6 +628,7 @@ def test_a_disconnected_graph_has_components_and_no_claim():
     assert without["unverified"]["simulation"] is None
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("edges", [[], [(1, 2, -1), (2, 1, -1)]])
 def test_more_than_a_hundred_components_are_grouped_in_arrays(edges: list[tuple]):
     few, many = (
@@ -658,7 +665,7 @@ def ring(n: int, last: int) -> SignedDigraph:
     return SignedDigraph.from_edges([(i, (i + 1) % n, last if i == n - 1 else 1) for i in range(n)])
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("n", "last", "searched"), thinned([(121, 1, True), (121, -1, True), (SEARCH_NODES + 1, 1, False)], 2)
 )
@@ -812,6 +819,7 @@ def same_functions(first: Certificate, second: Certificate, order: np.ndarray, s
         assert dict(zip(b.nodes, map(float, b.weights), strict=True)) == pytest.approx(weights, rel=1e-3)
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("name", "method"), thinned([*((name, "perron") for name in SOME), *((name, "best") for name in SOME[::2])])
 )
@@ -827,6 +835,7 @@ def test_relabelling_permutes_the_searched_functions(name: str, method: str):
         same_functions(first, second, order)
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", thinned(SOME[::2]))
 def test_heavier_edges_scale_every_rate(name: str):
     """Three times the weights and a third of the gain is the same motion: the same members, their rates times 3."""
@@ -838,6 +847,7 @@ def test_heavier_edges_scale_every_rate(name: str):
     same_functions(*perron, np.arange(graph.n_nodes), 3)
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", thinned(SOME[1::2]))
 def test_a_gauge_changes_no_rate(name: str):
     """An agent that joins the other camp: the signs of all its edges change, and no rate."""
@@ -854,6 +864,7 @@ def exact_edges(graph: SignedDigraph) -> list[tuple[str, str, Fraction]]:
     return [(s, t, Fraction(w)) for s, t, w in graph.edges]
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("one", "other"), thinned(pairwise(SOME)))
 def test_a_union_is_as_slow_as_its_slower_part(one: str, other: str):
     parts = [of_size(one, 5), of_size(other, 5, seed=6)]
@@ -865,6 +876,7 @@ def test_a_union_is_as_slow_as_its_slower_part(one: str, other: str):
     assert union.optimality_ratio is not None and 0.99 <= union.optimality_ratio <= 1
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("name", "kwargs"), class_cases(("3.2",), SOME))
 def test_a_method_keeps_to_its_class(name: str, kwargs: dict):
     graph = of_size(name, seed=7)
@@ -894,6 +906,7 @@ def test_a_method_keeps_to_its_class(name: str, kwargs: dict):
 UNDIRECTED = [name for name, kwargs in CLASSES if kwargs.get("special") == "undirected"]
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("weights", ["small ints", "log6"])
 @pytest.mark.parametrize("name", thinned(UNDIRECTED, 3))
 def test_the_perron_vector_alone_is_tight_on_undirected_graphs(name: str, weights: str):
@@ -969,6 +982,7 @@ def test_a_number_is_written_exactly_or_enclosed(numerator: int, power: int):
         assert all(len(text) < 500 for text in written.values())
 
 
+@pytest.mark.few(0)
 def test_an_final_state_too_long_to_write_is_enclosed_and_proved():
     """Of weights of 250 digits, left null vectors and containment weights are balls that hold the exact ones.
 
@@ -1029,6 +1043,7 @@ def test_the_upper_bound_is_near_the_slowest_mode_and_at_most_twice_the_mean_eig
         assert cert.spectral_rate <= float(cert.upper_bound) * (1 + 1e-12)
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("seed", thinned([0, 2, 1], 2))
 def test_there_is_one_upper_bound_on_the_rate_and_one_optimality_ratio(seed: int, tmp_path: Path):
     """In the object, its file, what is read back, the table of a batch, and what ``--min-rate`` is refuted by."""

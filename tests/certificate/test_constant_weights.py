@@ -61,6 +61,7 @@ def compare(seed: int) -> int:
     return 1
 
 
+@pytest.mark.few(0)
 def test_the_ends_that_are_certified_are_those_of_all_vertices():
     assert sum(map(compare, range(4))) >= 2
 
@@ -116,6 +117,7 @@ def test_nothing_is_claimed_where_it_would_say_no_more():
     assert not certify_family(Family.from_intervals(PAIR), PROTOCOL, [0, 6, 1], time_limit=3).restricted
 
 
+@pytest.mark.few(0)
 def test_at_rest_in_the_sliding_mode_the_ends_are_the_same_and_none_are_claimed_otherwise():
     family, protocol = Family.from_intervals(PAIR), SlidingModeProtocol(**GAINS)
     certificate = made(family, [0, 6, 100], protocol)
@@ -127,6 +129,7 @@ def test_at_rest_in_the_sliding_mode_the_ends_are_the_same_and_none_are_claimed_
     assert "while sliding variables move" in (check(resealed(forged)).reason or "")
 
 
+@pytest.mark.few(0)
 def test_what_is_read_back_says_the_same(monkeypatch: pytest.MonkeyPatch):
     """No limit is met on a clock that stands still; what one cuts off is a note that no file keeps."""
     monkeypatch.setattr(search_time, "_now", lambda: 0.0)
@@ -137,6 +140,7 @@ def test_what_is_read_back_says_the_same(monkeypatch: pytest.MonkeyPatch):
     assert own.__dict__ == other.__dict__
 
 
+@pytest.mark.few(0)
 @pytest.mark.usefixtures("framed_figures")
 def test_screen_page_and_statement_tell_the_ends_of_constant_weights():
     saved = read_certificate(pair().to_dict())
@@ -212,6 +216,7 @@ def test_both_vectors_are_told(key: str):
     assert report.reason == f"{key} is not an object"
 
 
+@pytest.mark.few(0)
 def test_optional_edges_count_for_who_decides():
     """``c`` is heard only at times; then its state counts, and a claim about ``a``, ``b`` alone is refused."""
     edges = [("a", "b", 1, 1), ("b", "a", 1, 1), ("b", "c", 1, 1), ("c", "b", 0, 1)]
@@ -224,6 +229,7 @@ def test_optional_edges_count_for_who_decides():
         assert check(resealed(changed(data, ("restricted", place, "modes", 0, key), short))).rejected
 
 
+@pytest.mark.few(0)
 def test_a_vector_of_another_mode_proves_nothing():
     one, other = ([("a", "b", 1, 2), ("b", "a", 1, 1)], [("a", "b", 5, 6), ("b", "a", 1, 1)])
     data = made(Family.switching([Family.from_intervals(one), Family.from_intervals(other)]), [0, 6]).to_dict()

@@ -53,6 +53,7 @@ def worst_ratios(rng, families, count, steps=(3,), **options):
     return worst, runs
 
 
+@pytest.mark.few(0)
 def test_no_signal_exceeds_what_is_proved():
     rng = np.random.default_rng(11)
     families = [random_family(rng, "consensus", 3, 2, Fraction(1, 5))]
@@ -89,6 +90,7 @@ def test_a_certificate_that_claims_too_much_is_found_out():
     )
 
 
+@pytest.mark.few(0)
 def test_the_worst_case_falls_more_slowly_than_random_signals():
     rng = np.random.default_rng(7)
     family = random_family(rng, "stability", 3, 2, Fraction(1, 4))

@@ -118,6 +118,7 @@ def worst_ratios(rng, families, played=4, **options):
     return worst, runs
 
 
+@pytest.mark.few(0)
 def test_neither_signal_nor_disturbance_exceeds_what_is_proved():
     rng = np.random.default_rng(9)
     families = [drawn_family(rng, 3), Family.from_intervals(TRAP)]
@@ -174,6 +175,7 @@ def largest_value(V, sizes):
     return sum((p * Fraction(product) for p, product in pairs), Fraction(0))
 
 
+@pytest.mark.few(0)
 def test_entries_of_c_l_that_cancel_at_the_largest_weights_bound_nothing():
     certificate, quotient, cancelled, moved, _ = trap()
     assert quotient.pivots == (0,) and cancelled[:4] == [0] * 4  # a and every b hear c with 10
@@ -187,6 +189,7 @@ def test_entries_of_c_l_that_cancel_at_the_largest_weights_bound_nothing():
     assert max(shares) > 4
 
 
+@pytest.mark.few(0)
 def test_a_drive_of_cancelled_entries_is_refused():
     certificate, _, cancelled, _, _ = trap()
     data = certificate.to_dict()
@@ -263,6 +266,7 @@ def test_integrals_of_what_drives_are_enclosed_closely():
 # ---------------------------------------------------------------------- sigma(0) = 0, and one graph
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("kind", thinned(KINDS, 2))
 def test_without_sliding_variables_all_is_as_without_disturbances(kind):
     rng = np.random.default_rng(8)
@@ -317,6 +321,7 @@ def test_functions_of_rows_are_driven_too(kind):
 # ---------------------------------------------------------------------- files, and what is refused
 
 
+@pytest.mark.few(0)
 def test_a_file_is_read_back_as_it_was(tmp_path):
     family = Family.from_intervals(TRAP)
     certificate = certify_family(family, PROTOCOL, [1, 2, 3], sigma0=[1, 0, "-1/4"], time_limit=60)

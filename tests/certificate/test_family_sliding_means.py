@@ -40,6 +40,7 @@ def runs(certificate, played=3, **options):
         yield simulate(certificate.family, certificate.protocol, start, RandomSignal(k), **more)
 
 
+@pytest.mark.few(0)
 def test_means_that_every_signal_keeps_are_those_of_x_minus_sigma():
     x0, sigma0 = [3, 1, 2], ["1", "-2", "1/2"]
     certificate = certify_family(PATH, PROTOCOL, x0, sigma0=sigma0, time_limit=60)
@@ -60,6 +61,7 @@ def test_a_mean_of_x_in_place_of_x_minus_sigma_is_refused():
     assert check(data | {"digest": digest(data)}).reason == "a final state is not enclosed"
 
 
+@pytest.mark.few(0)
 def test_groups_and_followers_end_within_what_is_proved():
     rng = np.random.default_rng(11)
     for n in (4, 5):
@@ -71,6 +73,7 @@ def test_groups_and_followers_end_within_what_is_proved():
             assert not compare(certificate, run).violated
 
 
+@pytest.mark.few(0)
 def test_narrower_ends_than_sliding_variables_leave_are_refused():
     family = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 3), ("b", "c", 1, 2)])
     certificate = certify_family(family, PROTOCOL, [5, 6, 3], sigma0=[9, 8, 1], time_limit=60)
@@ -91,7 +94,7 @@ def of_led(sigma0):
     return certify_family(LED, PROTOCOL, [3, 1, 2], sigma0=sigma0, time_limit=60)
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("sigma0", [(0, 0, 0), (1, -2, 3)])
 def test_inputs_are_below_their_curve(sigma0):
     certificate = of_led(sigma0)
@@ -123,6 +126,7 @@ def test_restricted_signals_are_for_the_nominal_protocol(signal):
         certify_family(PATH, PROTOCOL, [3, 1, 2], signal=signal)
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("sigma0", [(0, 0, 0), (1, -2, 3)])
 def test_a_file_that_adds_restricted_signals_is_refused(sigma0):
     nominal = NominalProtocol(T=2, rho1=1, rho2=1, kappa=3)
@@ -136,6 +140,7 @@ def test_a_file_that_adds_restricted_signals_is_refused(sigma0):
     assert not report.accepted and f"restricted signals {why}" in str(report.reason)
 
 
+@pytest.mark.few(0)
 @pytest.mark.usefixtures("framed_figures")
 def test_pages_and_statements_say_what_slides(tmp_path):
     made = of_path()

@@ -49,7 +49,7 @@ def part_of(certificate: Certificate) -> AgentsPart:
     return certificate.agents
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", KINDS)
 def test_phases_are_accepted_read_back_and_leave_less(name: str):
     certificate = made(name)
@@ -66,7 +66,7 @@ def test_phases_are_accepted_read_back_and_leave_less(name: str):
     )
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", KINDS)
 def test_deviations_stay_within_the_bounds_of_phases(name: str):
     part = part_of(made(name))
@@ -97,6 +97,7 @@ def times(factor: Any) -> Callable[[str], str]:
     return lambda text: str(F(text) * F(factor))
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("path", "change", "reason"),
     [
@@ -129,6 +130,7 @@ def test_phases_that_are_not_told_are_not_proved():
     assert (report.rejected, report.reason) == ("phases", "no phase, or more than 100")
 
 
+@pytest.mark.few(0)
 def test_phases_stand_beside_agents_of_order_n_without_a_cap_alone():
     phases = made("order 4").to_dict()["phases"]
     options: dict[str, Any] = {"simulation": False, "method": "paper"}

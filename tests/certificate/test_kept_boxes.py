@@ -81,7 +81,7 @@ def reached(family: Family, x: list[Fraction], rng: random.Random) -> tuple[np.n
     return low, high
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("seed", thinned(range(12), 3))
 def test_every_signal_keeps_agents_within_the_ends_of_all_walks(seed: int):
     rng = random.Random(seed)
@@ -135,6 +135,7 @@ def test_no_end_is_accepted_that_is_nearer():
             assert report.accepted or report.reason == "an agent may leave the box"
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
@@ -155,6 +156,7 @@ def test_a_box_that_is_none_is_rejected(change: dict[str, Any], reason: str):
     assert check(resealed(data)).reason == reason
 
 
+@pytest.mark.few(0)
 def test_boxes_have_an_order_and_obligations_of_their_own():
     data = made(MOVED, X0).to_dict()
     turned = copy.deepcopy(data)

@@ -58,7 +58,7 @@ def made(name: str, seed: int = 3) -> tuple[Certificate, Json]:
     return found, json.loads(found.to_json())
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(0)
 @pytest.mark.usefixtures("small_is_large")
 @pytest.mark.parametrize(("name", "kwargs"), class_cases(KINDS[1::4]))
 def test_every_class_is_certified_as_a_large_graph(name: str, kwargs: dict):
@@ -88,7 +88,7 @@ def rejected(data: Json, where: str) -> None:
     assert (report.rejected or "").startswith(where), (report.rejected, report.reason)
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.usefixtures("small_is_large")
 @pytest.mark.parametrize("name", ["2.1 K>=2", "2.2", "3.1 mixed", "3.2", "3.1 all single"])
 def test_false_rates_and_narrow_intervals_are_rejected(name: str):
@@ -179,6 +179,7 @@ def strong_graph(n: int, balanced: bool, seed: int, followers: int = 0) -> Signe
     return SignedDigraph.from_edges([(s, t, w) for (s, t), w in edges.items()], nodes=range(n + followers))
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("balanced", "followers"), thinned([(False, 0), (True, 60)], 2))
 def test_large_leader_groups_are_proved_by_a_sparse_factor(balanced: bool, followers: int):
     graph = strong_graph(150, balanced, 7 + followers, followers)
@@ -216,6 +217,7 @@ def test_a_factor_is_of_the_matrix_that_the_checker_forms():
     assert certify(graph, NOMINAL, asks=Asks(simulation=False)).verdict == "certified"
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("balanced", thinned([True, False], 2))
 def test_leader_groups_of_hundreds_take_the_best_diagonal_matrix(balanced: bool):
     graph = strong_graph(125, balanced, 1)
@@ -232,6 +234,7 @@ def test_leader_groups_of_hundreds_take_the_best_diagonal_matrix(balanced: bool)
     assert set(found["best"].search.searched) == {"perron", "lmi"}
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("balanced", thinned([True, False], 2))
 def test_forged_rates_of_large_groups_are_rejected(balanced: bool):
     graph = strong_graph(130, balanced, 3)
@@ -304,6 +307,7 @@ def test_real_networks_of_thousands_are_certified(name: str, ratio: float, real_
     assert ratio * 2 * least <= float(cert.rate) <= 2 * least * (1 + 1e-9)
 
 
+@pytest.mark.few(0)
 def test_the_screen_tells_how_near_the_final_state_is_known():
     graph = random_sparse(150, 4)
     cert = certify(graph, NOMINAL, [1] * 150, asks=Asks(simulation=False))
@@ -353,6 +357,7 @@ def test_weights_and_starts_of_any_size_are_certified(graph: SignedDigraph, star
     assert cert.verdict == "certified", cert.notes
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     "graph",
     [
@@ -394,6 +399,7 @@ def test_a_leader_group_over_many_decades():
     assert cert.verdict == "certified", cert.notes
 
 
+@pytest.mark.few(0)
 def test_long_chains_have_a_bound_that_says_something():
     """The fastest member has an astronomical prefactor; the slowest one bounds the first instants."""
     found = certify(chain([1] * 141), NOMINAL, asks=Asks(simulation=False)).search.functions
@@ -443,7 +449,7 @@ def test_undirected_groups_that_mix_slowly_are_certified(name: str):
     assert cert.final_state is not None and list(cert.final_state.states) == [g * mean for g in camps]
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     "start", [[0] * 130, [(-1) ** i for i in range(130)], [0] * 129 + ["1e-320"]], ids=["zero", "degenerate", "tiny"]
 )
@@ -454,6 +460,7 @@ def test_starts_that_meet_at_zero_and_tiny_ones(start: list[Any]):
     assert cert.final_state is not None and cert.final_state.degenerate == (() if start[-1] == "1e-320" else (1,))
 
 
+@pytest.mark.few(0)
 def test_a_directed_group_that_starts_at_zero_meets_there():
     directed = certify(strong_graph(125, True, 2), NOMINAL, [0] * 125, asks=Asks(simulation=False, method="perron"))
     assert (
@@ -499,6 +506,7 @@ def mean_of_start(cert: Certificate) -> list[Fraction]:
     return [g * mean for g in camps]
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("closed", thinned([False, True], 2), ids=["path", "ring"])
 def test_long_undirected_groups_have_an_exact_left_vector(closed: bool):
     """A factor in floats finds it to 1e-11 only, and the cube of the Laplacian is not proved."""
@@ -532,7 +540,7 @@ def test_the_vector_of_ones_belongs_to_connected_graphs_of_equal_flows_only():
         left_vector(undirected([(i, i + 1, 1) for i in range(0, 600, 2)]))
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("method", ["perron", "best"])
 @pytest.mark.parametrize("weight", thinned([1.7e308, 1e306], 2))
 def test_weights_near_the_largest_float_are_undecided(weight: float, method: str):

@@ -128,7 +128,7 @@ def agrees(large: Certificate, exact: Certificate, width: float = 1e-8) -> None:
         assert abs(m - x) <= r + s and r <= width
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("kind", thinned(KINDS, 3))
 def test_the_large_form_encloses_the_exact_final_states(kind: str):
     graph = team(28, 2)
@@ -137,6 +137,7 @@ def test_the_large_form_encloses_the_exact_final_states(kind: str):
     assert check(large.to_dict(), stdlib=True).accepted
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("N", "seed"), thinned([(24, 3), (120, 4)], 2))
 def test_it_does_so_in_the_plane_and_up_to_the_largest_exact_graphs(N: int, seed: int):
     graph = team(N, seed)
@@ -204,7 +205,7 @@ def test_agents_that_begin_in_rest_at_their_places_end_there_exactly():
 # ---------------------------------------------------------------------- what is forged
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("kind", thinned(["double integrators", "with drag in a formation", "cascade"], 2))
 def test_ends_that_are_moved_and_radii_that_are_too_small_are_rejected(kind: str):
     data = document(kind)

@@ -145,6 +145,7 @@ def test_no_admissible_signal_of_thousands_exceeds_the_bound(more: bool):
     assert max(excesses(400, 1, more)) <= 1e-9
 
 
+@pytest.mark.few(0)
 def test_more_is_proved_for_seldom_switches_than_for_any():
     """Each mode has the rate 4.4 by itself; switched fast, in equal shares, they decay with 0.65."""
     signals = ("any", DwellTime("0.1", clock="s"), ON_CLOCK, IN_TIME, "constant")
@@ -204,6 +205,7 @@ def test_the_error_bound_of_seldom_switches_is_told_beside_that_of_every_signal(
     assert "(these signals)." in statement
 
 
+@pytest.mark.few(0)
 def test_so_many_switches_that_nothing_would_be_said_leave_the_bound_of_every_signal():
     certificate = of_slowed(DwellTime("1e-6", clock="t"))
     assert (deviation_of_signal(certificate, [0.01]) == certificate.deviation_bound([0.01])).all()
@@ -257,6 +259,7 @@ def test_signals_that_are_none_are_refused():
         certify(SignedDigraph.from_edges([("a", "b", 1)]), PROTOCOL, signal=ON_CLOCK)
 
 
+@pytest.mark.few(0)
 def test_a_rate_that_is_asked_for_is_judged_for_these_signals():
     family = slowed_by_switches()
     asked = Expectations(min_rate="4")
@@ -329,6 +332,7 @@ def test_where_kernels_differ_the_last_mode_decides():
     assert claim.final_states == ((1, 1), (-1, 2), (-1, 3)) and last(against(), ON_CLOCK).restricted == ()
 
 
+@pytest.mark.few(0)
 def test_an_expectation_is_judged_by_the_last_mode():
     for expected, met in (("bipartite consensus", True), ("bipartite containment", True), ("stability", False)):
         answers = [last(against(), signal, expectations=expected).assessment.asked for signal in (IN_TIME, "any")]
@@ -364,6 +368,7 @@ def test_a_mode_whose_uncertain_weights_move_targets_is_not_told():
     assert made.restricted[0].final_states == ((1, 1), (1, 3), (3, 3))
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("seed", thinned(range(12)))
 def test_no_signal_leaves_the_ends_of_the_last_mode(seed: int):
     draw, rng = random.Random(seed), np.random.default_rng(seed)
@@ -448,6 +453,7 @@ def test_windows_that_no_signal_keeps_are_refused_and_those_that_one_just_keeps_
         certify_family(family, PROTOCOL, signal=JointWindows(1, on=Fraction(1, n) + Fraction(1, 10**9), clock="s"))
 
 
+@pytest.mark.few(0)
 def test_what_all_edges_need_of_the_clock_is_the_least_of_all_plays():
     rng = np.random.default_rng(5)
     for _ in range(30):
@@ -487,6 +493,7 @@ def with_outage(kind: str) -> Family:
     return Family.switching({"one": modes[0], "outage": outage, "other": modes[1]})
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("kind", ["stability", "consensus"])
 def test_shares_of_the_clock_weigh_the_rates_of_modes(kind: str):
     family, shares = with_outage(kind), [Fraction(5, 10), Fraction(3, 10), Fraction(2, 10)]
@@ -508,6 +515,7 @@ def test_shares_of_the_clock_weigh_the_rates_of_modes(kind: str):
             assert xi @ P @ xi <= decay * first * (1 + 1e-9)
 
 
+@pytest.mark.few(0)
 def test_a_function_for_every_signal_stands_for_shares_where_their_own_search_finds_less():
     family, shares = slowed_by_switches(), [Fraction(1, 2), Fraction(1, 2)]
     (component,) = decide(family)
@@ -518,6 +526,7 @@ def test_a_function_for_every_signal_stands_for_shares_where_their_own_search_fi
     assert form is not None and form.function is fast
 
 
+@pytest.mark.few(0)
 def test_a_rate_that_is_asked_for_is_met_by_that_for_every_signal_where_shares_prove_less():
     family = slowed_by_switches()
     made = certify_family(family, PROTOCOL, signal=ClockShares(["0.5", "0.5"]))
@@ -567,6 +576,7 @@ def played_by_shares(family: Family, shares: list[Fraction], x: np.ndarray, rng:
     return x
 
 
+@pytest.mark.few(0)
 def test_shares_tell_where_agents_end_exactly_where_a_mean_is_kept():
     day = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 3), ("b", "c", -2)])
     outage = SignedDigraph.from_edges([], nodes="abc")
@@ -606,6 +616,7 @@ def test_shares_that_bring_agents_to_0_say_so(tmp_path: Path):
     assert read_certificate(tmp_path / "c.json").restricted[0].final_states == ((0, 0),) * 4
 
 
+@pytest.mark.few(0)
 def test_no_end_that_shares_do_not_prove_is_accepted(tmp_path: Path):
     day, outage = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", -3)]), SignedDigraph.from_edges([], nodes="ab")
     balanced = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 3)])

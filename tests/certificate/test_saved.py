@@ -92,7 +92,7 @@ def agree(saved: Certificate, made: ptcc.Certificate) -> None:
         ]
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", thinned(sorted(CLASSES)))
 def test_a_certificate_comes_back_as_it_was(name: str, tmp_path: Path):
     made = certified(name)
@@ -107,6 +107,7 @@ def test_a_certificate_comes_back_as_it_was(name: str, tmp_path: Path):
         assert saved.degenerate == made.final_state.degenerate
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", thinned(["3.2 chain", "1.1", "2.1 K>=2 reducible followers"], 3))
 def test_a_sliding_mode_certificate_comes_back_as_it_was(name: str, tmp_path: Path):
     made = certified(name, protocol=SLIDING)
@@ -117,6 +118,7 @@ def test_a_sliding_mode_certificate_comes_back_as_it_was(name: str, tmp_path: Pa
     assert np.array_equal(saved.deviation_bound([0.5, 1e-6]), made.deviation_bound([0.5, 1e-6]))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     "options",
     thinned(
@@ -140,6 +142,7 @@ def test_sets_of_starts_limits_and_noise_come_back(options: dict[str, Any], tmp_
     agree(written(made, tmp_path), made)
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", thinned(["2.1 K>=2 reducible followers", "1.1", "3.1 mixed several"], 3))
 def test_the_bound_is_never_below_what_the_exact_numbers_say(name: str, tmp_path: Path):
     """``sqrt(V(0) / lmin) e^(-rate s / 2)`` of every member, enclosed in balls from the texts of the file."""
@@ -225,6 +228,7 @@ def test_side_files_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     assert np.array_equal(saved.norm_bound(REMAINING), made.norm_bound(REMAINING))
 
 
+@pytest.mark.few(0)
 def test_side_files_go_with_a_certificate_that_was_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(vectors, "LONG", 3)
     weights = [("file", "sha256", -1), ("sha256", "file", -1), ("file", "c", 1), ("c", "d", 1)]
@@ -261,7 +265,7 @@ def test_a_run_repeated_from_the_file_keeps_the_bounds(number: int, tmp_path: Pa
     assert np.array_equal(saved.trajectory.states, made.trajectory.states)
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("said", [None, "worst-case", "telegraph", "none", "no such", "9*sin(t)", "__import__('os')"])
 def test_a_disturbance_that_is_no_expression_within_delta_gives_way_to_the_worst_case(said: str | None, tmp_path: Path):
     pair = ptcc.SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
@@ -339,6 +343,7 @@ def test_without_a_start_there_is_no_bound_from_it(tmp_path: Path):
     assert math.isfinite(saved.envelope.residual(0.5))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     "part", [{"protocol": ptcc.NominalProtocol(T=100)}, {"initial_state": (Fraction(1),) * 6}, {"final_state": None}]
 )

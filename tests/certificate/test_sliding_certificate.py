@@ -61,7 +61,7 @@ def sliding_run(certificate: Certificate) -> Trajectory:
 # ---------------------------------------------------------------------- the paper's examples
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("number", "name"), RUNS)
 def test_the_examples_behave_as_the_paper_reports(number: str, name: str):
     cert, run = example(number, name), sliding_run(example(number, name))
@@ -92,6 +92,7 @@ def test_the_examples_behave_as_the_paper_reports(number: str, name: str):
     assert np.abs(run.final_state - np.asarray(cert.final_state)).max() <= 1e-8
 
 
+@pytest.mark.few(0)
 def test_the_corollaries_are_those_of_the_sliding_mode():
     protocol = SlidingModeProtocol(1, 1, 1, 1, 2, 2, 1, 1, 1)
     pair = certify(SignedDigraph.from_edges([(1, 2, 3), (2, 1, 3)]), protocol)
@@ -149,6 +150,7 @@ def test_every_key_about_the_sliding_mode_is_exact_and_readable():
     assert data["unverified"]["residual"] is None
 
 
+@pytest.mark.few(0)
 def test_a_reaching_time_is_part_of_the_proof_only_where_one_is_proved():
     """``mu3 kappa < 1`` and a large ``sigma(0)``: certain at ``T_r`` only, and ``z`` is null."""
     graph = SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1)])
@@ -202,6 +204,7 @@ def test_the_check_sees_a_reaching_time_that_is_too_early_and_gains_that_prove_n
     assert spoilt(data, "reaching_time", "bound", to="||sigma(t)|| <= 0") == "reaching_time"
 
 
+@pytest.mark.few(0)
 def test_certified_reaching_times_hold_in_balls():
     cert = example("5", "fig3a")
     protocol = cert.protocol
@@ -226,6 +229,7 @@ def test_without_a_start_the_reaching_times_are_proved_all_the_same():
     assert json.loads(cert.to_json())["problem"]["sliding_variable"] == {"a": "0", "b": "2"}
 
 
+@pytest.mark.few(0)
 def test_without_sigma_the_certificate_is_the_nominal_one():
     protocol = SlidingModeProtocol("0.5", "0.5", 1, 1, 2, 2, 1, 1, 1)
     graph = load_graph("fig3a")
@@ -270,6 +274,7 @@ def test_the_bound_cannot_be_asked_as_a_multiple_of_the_start_while_sigma_drives
         envelope.bound(1.0, np.ones(6))
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("number", "name"), RUNS)
 def test_the_bound_of_the_state_holds_along_the_run_and_falls_after_T_r(number: str, name: str):
     cert, run = example(number, name), sliding_run(example(number, name))
@@ -393,7 +398,7 @@ POWERS = (Fraction(1, 3), Fraction(1), Fraction(9, 5))
 OF_EACH_ROW = ("1.1", "1.2", "2.1 K=1", "2.1 K>=2", "2.2", "3.1 mixed", "3.1 mixed no single", "3.2")
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("name", "kwargs"), class_cases((*OF_EACH_ROW[1::2], "disconnected 1.2 2.1 isolated")))
 def test_every_row_keeps_its_bounds(name: str, kwargs: dict):
     number = [known for known, _ in all_classes()].index(name)
@@ -439,7 +444,7 @@ def path_protocol(**other: Any) -> SlidingModeProtocol:
     return SlidingModeProtocol(**(given | other))
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("mu1", ["1.001", "1.1", 2])
 @pytest.mark.parametrize("seed", thinned(range(4)))
 def test_a_function_that_is_the_worst_case_is_not_taken_for_a_violation(mu1: Any, seed: int):
@@ -486,12 +491,14 @@ def test_what_rounding_allows_beyond_delta_never_reaches_mu1():
     assert (run.sliding.reaching_z > 0).all()
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("text", thinned(["3*sin(pi*2**20*19999*t)", "1.9*abs(sin(pi*2**18*19999*t/1.25))"], 2))
 def test_a_fast_signal_does_not_hide_between_the_samples(text: str):
     with pytest.raises(ParameterError, match="beyond delta"):
         simulate(PATH, path_protocol(), [5, 2, -4], disturbance=text)
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("mu1", thinned(["1e-290", "1e-5"], 2))
 def test_starts_of_any_size_keep_their_bounds(mu1: str):
     protocol = path_protocol(mu1=mu1, delta=0, mu3="0.5")

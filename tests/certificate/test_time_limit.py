@@ -107,6 +107,7 @@ def tree(n: int) -> SignedDigraph:
     return SignedDigraph.from_edges([(k // 2, k, 1 if k % 3 else -2) for k in range(1, n)])
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("graph", [load_graph("fig1a"), tree(130)], ids=["small", "large"])
 def test_without_a_limit_asked_for_no_wall_time_changes_what_is_found_of_a_graph(
     graph: SignedDigraph, monkeypatch: pytest.MonkeyPatch
@@ -134,6 +135,7 @@ def test_a_limit_that_is_asked_for_counts_wall_time(monkeypatch: pytest.MonkeyPa
     ).cut_off  # a limit that is asked for
 
 
+@pytest.mark.few(0)
 def test_without_a_limit_asked_for_no_wall_time_changes_what_is_found_of_a_family(monkeypatch: pytest.MonkeyPatch):
     family = Family.from_intervals([(k, (k + 1) % 7, 1, 2) for k in range(7)])
     at_leisure = certify_family(family, PROTOCOL)
@@ -240,6 +242,7 @@ print(cert.verdict, cert.cut_off)
 """
 
 
+@pytest.mark.few(0)
 @linux
 def test_a_solver_that_holds_the_interpreter_is_ended_at_the_limit():
     run = subprocess.run([sys.executable, "-c", HOLDS, "12"], capture_output=True, text=True, timeout=300, check=True)
@@ -247,6 +250,7 @@ def test_a_solver_that_holds_the_interpreter_is_ended_at_the_limit():
     assert told.startswith("certified ") and "'class lmi'" in told  # a busy machine cuts off more
 
 
+@pytest.mark.few(0)
 @linux
 def test_a_solver_that_holds_the_interpreter_is_ended_by_an_interrupt():
     run = subprocess.Popen(
@@ -345,6 +349,7 @@ def test_an_error_that_cannot_be_handed_over_is_told_in_words():
         list(apart(fails))
 
 
+@pytest.mark.few(0)
 @linux
 def test_a_search_apart_ends_though_the_solver_ran_before():
     """Clarabel waits for ever in a child that is forked after it ran, from about 20 rows on."""
@@ -355,6 +360,7 @@ def test_a_search_apart_ends_though_the_solver_ran_before():
     assert found > 0
 
 
+@pytest.mark.few(0)
 @linux
 def test_what_came_before_the_limit_is_kept():
     found = []
@@ -369,6 +375,7 @@ def test_what_came_before_the_limit_is_kept():
     assert found == [1]
 
 
+@pytest.mark.few(0)
 def test_without_a_limit_nothing_is_cut_off():
     cert = certify(load_graph("fig3a"), PROTOCOL, [1] * 6, asks=Asks(time_limit=math.inf))
     assert cert.cut_off == () and cert.verdict == "certified"

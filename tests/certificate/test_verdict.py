@@ -61,7 +61,7 @@ def weak(k: int, sliding: bool = False) -> Certificate:
 # ---------------------------------------------------------------------- usefulness
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("k", "sliding"), thinned([(k, k % 3 == 0) for k in range(1, 11)], 2))
 def test_the_gains_that_are_named_leave_one_percent_and_bound_the_input(k: int, sliding: bool):
     """Certified with what the line says, nothing else changed, at most a hundredth is left, of a bounded input."""
@@ -112,6 +112,7 @@ def test_what_is_useful_is_stated_and_true():
     assert said is not None and cert.envelope.residual(float(LAST)) <= float(said[1]) <= 0.01
 
 
+@pytest.mark.few(0)
 def test_a_bound_is_useful_too_if_no_agent_has_more_than_a_hundredth_of_the_longest_way_left():
     """Of ``||E||`` from any start more may be left than of the way of the last of a chain, who alone has one."""
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1), ("c", "d", 1)])
@@ -150,7 +151,7 @@ def strong() -> Certificate:
 
 
 @pytest.mark.usefixtures("every_class")
-@pytest.mark.few(6)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("rate", ["met", "refuted", "left open", None])
 @pytest.mark.parametrize("most", ["met", "refuted", "left open", None])
 @pytest.mark.parametrize("behaviour", ["met", "refuted", None])
@@ -179,7 +180,7 @@ def test_codes_are_worst_first():
     assert worst_code([4, 0, 1, 3]) == 1 and worst_code([0, 4]) == 4 and worst_code([]) == 0
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("options", "code", "says"),
     thinned(
@@ -227,6 +228,7 @@ def test_an_expectation_that_is_not_met_is_in_the_verdict_line(options: tuple[st
 FAR = [("a", "b", "1e300"), ("b", "a", "1e300"), ("b", "c", "1e-300"), ("c", "d", "-1e300"), ("d", "c", "1e-300")]
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("graph", "method", "says"),
     [
@@ -248,6 +250,7 @@ def test_where_nothing_is_decided_it_says_what_to_try(graph: Any, method: str, s
 # ---------------------------------------------------------------------- page, statement, notebook, file
 
 
+@pytest.mark.few(0)
 def test_page_statement_and_notebook_say_the_same(tmp_path: Path):
     """With what was asked; the page of a bound that says little is not green."""
     asked = Expectations("stability", Fraction(10), Fraction(10**6))
@@ -304,6 +307,7 @@ def test_noise_from_the_final_state_is_not_a_share_of_nothing():
     assert found.useful is False and "||E|| <= 0.29 at T" in found.remark
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("followers", thinned([40, 100], 2))
 def test_of_a_set_no_share_is_stated_that_single_states_exceed(followers: int):
     hub = SignedDigraph.from_edges([(1, 2, 1), *((2, 3 + k, 10) for k in range(followers))])
@@ -314,6 +318,7 @@ def test_of_a_set_no_share_is_stated_that_single_states_exceed(followers: int):
     assert "||E(0)||" not in found.remark and "from all these initial states" in found.remark
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("size", ["0.01", "1000", "1e200"])
 def test_the_verdict_on_a_set_does_not_hang_on_another_start(size: str):
     sets = initial_set_within(analyse(PAIR), size)

@@ -355,6 +355,7 @@ def nudges(data: Json, seed: int, count: int) -> Iterator[tuple[Any, Json]]:
     return nudged(data, ("agents", "gain", "graph", "decays", "instants"), seed, count, told_again)
 
 
+@pytest.mark.few(0)
 def test_mutants_that_are_accepted_are_true():
     data = made("formation")
     own = ((path, x) for path, x in mutants(data, 41, 1) if path[0] in ("agents", "proof", "instants"))

@@ -856,6 +856,7 @@ def with_many_functions(leaders: int, modes: int) -> Json:
     return {**data, "decays": [one] * 100, "proof": rest[:place] + many + rest[place:]}
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     "make",
     [

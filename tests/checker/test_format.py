@@ -170,6 +170,7 @@ def test_no_key_may_be_null():
             assert {"type": "null"} not in one.get("anyOf", [one]), key
 
 
+@pytest.mark.few(12)
 @pytest.mark.parametrize("path", sorted(CORPUS.glob("*.json")), ids=lambda path: path.stem)
 def test_every_stored_certificate_is_valid(path: Path):
     VALIDATOR.validate(json.loads(path.read_text("utf-8")))
@@ -251,6 +252,7 @@ def test_side_vectors_and_factors_are_valid(monkeypatch: pytest.MonkeyPatch):
         assert not valid(changed(data, path, new))
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("samples", [SAMPLE[:2], pytest.param(SAMPLE, marks=pytest.mark.campaign)], ids=len)
 def test_another_key_or_one_less_is_not_valid(samples: tuple[tuple[str, bool], ...]):
     """Every kind of object of the samples, once."""

@@ -96,6 +96,7 @@ def attacked(judge: Callable[[str, Path], Json], folder: Path, most: int) -> dic
     return found
 
 
+@pytest.mark.few(0)
 def test_hostile_files_stay_within_a_gigabyte_and_ten_seconds(worker: Callable[[str, Path], Json], tmp_path: Path):
     attacked(worker, tmp_path, len(HOSTILE))
 

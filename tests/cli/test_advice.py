@@ -363,7 +363,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         Path(name).write_text(text)
 
 
-@pytest.mark.few(8)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("line", thinned(COMMANDS, 8))
 def test_what_is_advised_is_not_refused(line: str) -> None:
     command = tuple(line.split())

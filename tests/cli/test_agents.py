@@ -73,7 +73,7 @@ def test_single_integrators_in_places_under_a_gain_cap_have_the_bounds_of_the_pl
     assert ptcc(*drawn, "-o", str(tmp_path / "m.png")).code == 0
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     "limits",
     [
@@ -116,6 +116,7 @@ def test_a_certificate_of_places_alone_is_drawn_from_positions(tmp_path: Path, m
     assert drawn[0].trajectory.positions[:, 0] == pytest.approx([6, 5, 4, 3, 2, 1], rel=1e-12)
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("what", ["states", "motion", "input", "decay"])
 def test_figures_of_a_formation_take_limits_of_the_gain(what: str, tmp_path: Path):
     case = ("plot", "fig1a", "--offsets", "1,2,3,4,5,6", "--what", what, "-o", str(tmp_path / "f.png"))
@@ -131,6 +132,7 @@ def test_a_limit_of_the_input_that_is_exceeded_at_first_is_refuted():
     assert told.code == 0 and "met: ||u_k|| <= 1000000000" in told.out
 
 
+@pytest.mark.few(0)
 def test_a_scenario_tells_the_agents(tmp_path: Path):
     (tmp_path / "v.csv").write_text("node,x\n" + "".join(f"{k},{k}\n" for k in range(1, 7)))
     text = '[graph]\nfile = "fig1a"\n[agents]\nkind = "double-integrator"\ndrag = 0.2\nv0 = "v.csv"\n'
@@ -182,6 +184,7 @@ def test_a_simulated_run_of_agents_has_columns_of_velocities_and_ends_where_cert
         assert np.allclose([float(x) for x in rows[-1][2 + 6 * i : 8 + 6 * i]], proved, rtol=0, atol=1e-9)
 
 
+@pytest.mark.few(0)
 def test_a_simulated_run_has_the_gains_that_certify_proves_under_the_same_method():
     begin = ("fig1a", "--agents", "2", "--x0", "5,2,-4,3,-2,1")
     runs = {}
@@ -265,6 +268,7 @@ def test_what_design_does_not_search_of_agents_is_refused_in_one_line(options: t
     assert done.code == 2 and says in done.err and len(done.err.splitlines()) == 1
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("plant", ["[0, 0.1]", '"0,0.1"'])
 def test_a_scenario_lists_the_plant(tmp_path: Path, plant: str):
     text = f'[agents]\nkind = "double-integrator"\nplant = {plant}\n[certificate]\nmethod = "paper"\nsimulation = false'
@@ -272,6 +276,7 @@ def test_a_scenario_lists_the_plant(tmp_path: Path, plant: str):
     assert document["agents"]["plant"] == ["0", "1/10"]
 
 
+@pytest.mark.few(0)
 def test_nothing_that_is_rounded_is_called_exact():
     done = ptcc("certify", "fig1b", "--method", "paper", "--agents", "2", "--drag", "0.2", "--no-simulation")
     (line,) = [line for line in done.out.splitlines() if line.startswith("v(T)")]
@@ -354,6 +359,7 @@ def test_a_deadline_of_the_cascade_is_designed_and_proved_again_by_the_command_t
     assert again.code == 0 and "met: |u_k| <= 40" in " ".join(again.out.split())
 
 
+@pytest.mark.few(0)
 def test_coordinates_may_take_more_letters_than_the_name_of_a_file(tmp_path: Path):
     path = tmp_path / "many.csv"
     path.write_text("".join(f"{k},{k + 1},1\n" for k in range(100)))

@@ -105,7 +105,7 @@ def test_the_names_of_the_table_differ():
 SAMPLE = ("weight NaN", "XML entity bomb", "T NaN", "unknown command")
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("case", [c for c in BAD_INPUTS if c.name in SAMPLE], ids=lambda case: case.name)
 def test_bad_input_to_a_process_of_its_own(case: BadInput, folder: Path):
     write(case.files, folder)
@@ -152,6 +152,7 @@ def test_weights_at_the_ends_of_float64_give_an_answer(edges: list[tuple]):
     assert one_object(run.out)["verdict"] == {0: "certified", 4: "undecided"}[run.code]
 
 
+@pytest.mark.few(0)
 def test_starts_of_any_size_are_compared_alike():
     """The problem is linear: a start 10^200 times as large has the same ratios."""
     ratios = []
@@ -201,6 +202,7 @@ def test_an_error_of_the_program_is_not_taken_for_a_violated_bound(monkeypatch: 
         assert (run.code, run.out, len(run.err.strip().splitlines())) == (code, "", 1)
 
 
+@pytest.mark.few(0)
 @pytest.mark.usefixtures("every_class")
 @pytest.mark.parametrize("method", thinned(["paper", "perron", "lmi", "full", "best"], 2))
 def test_the_method_decides_which_classes_are_searched(method: str):
@@ -342,6 +344,7 @@ def test_weights_that_exact_proofs_cannot_take_are_refused_in_one_line(folder: P
     assert run.err.rstrip().endswith("round them, to 17 digits say")
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("ending", ["npy", "mtx"])
 @pytest.mark.parametrize("options", [(), ("--edges", "information"), ("--edges", "listens")])
 def test_check_reads_a_matrix_as_its_reader_says(folder: Path, ending: str, options: tuple[str, ...]):
@@ -363,6 +366,7 @@ def test_check_reads_a_matrix_as_its_reader_says(folder: Path, ending: str, opti
         assert run.code == 0, run.out
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("digits", [50, 200, 400])
 def test_long_weights_short_of_the_limit_are_certified(folder: Path, digits: int):
     rows = [
@@ -459,6 +463,7 @@ def test_of_one_mode_the_mean_eigenvalue_is_the_limit():
     assert ptcc("certify", name, "--min-rate", "8.000000000001").code == 3
 
 
+@pytest.mark.few(0)
 def test_a_class_that_is_not_proved_for_a_large_graph_leaves_it_undecided():
     name = save("ring.csv", ring(121))
     run = detailed("certify", name, "--method", "full", "--no-simulation")
@@ -472,6 +477,7 @@ def test_a_class_that_is_not_proved_for_a_large_graph_leaves_it_undecided():
     assert ptcc("classify", name).code == 0
 
 
+@pytest.mark.few(0)
 def test_every_behaviour_can_be_expected_with_hyphens_and_implies_the_weaker_ones():
     graphs = {
         "stability": save("s.csv", ring(3, -1)),
@@ -527,7 +533,7 @@ def odd_graphs() -> dict[str, str]:
     }
 
 
-@pytest.mark.few(6)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("command", ["classify", "certify"])
 @pytest.mark.parametrize("name", [*GRAPHS, "apart", "one", "isolated"])
 def test_json_is_exactly_one_object(command: str, name: str):
@@ -565,6 +571,7 @@ def test_the_certificate_is_written_whole(folder: Path):
     assert Path("c.json").read_text() == "an older file"
 
 
+@pytest.mark.few(0)
 def test_a_graph_from_standard_input():
     text = b"a,b,-1\nb,a,-1\n"
     for run in (
@@ -632,6 +639,7 @@ def test_what_was_merged_dropped_or_mirrored_is_said():
 LABELS = ["two words", "a,b", 'say "no"', "ünï ☃ 中", "line\nbreak", "\x1b[31mred", "\x9b2J", "\u202egnihton", "=1"]
 
 
+@pytest.mark.few(0)
 def test_labels_of_any_kind_are_printed_safely_and_kept():
     edges = [(a, b, 1) for a, b in zip(LABELS, LABELS[1:] + LABELS[:1], strict=True)]
     name = save("labels.csv", edges, LABELS)
@@ -667,6 +675,7 @@ def test_a_terminal_that_lacks_a_letter_is_no_obstacle():
     assert process("classify", "中.csv", env=env).code == 2
 
 
+@pytest.mark.few(0)
 def test_a_reader_that_stops_early_is_no_error():
     with subprocess.Popen(
         [sys.executable, "-m", "ptcc_certify.cli", "simulate", "fig1a", "--samples", "20000"],
@@ -680,6 +689,7 @@ def test_a_reader_that_stops_early_is_no_error():
     assert child.returncode == 0
 
 
+@pytest.mark.few(0)
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
 def test_a_full_disk_is_told():
     with Path("/dev/full").open("wb") as full:
@@ -695,6 +705,7 @@ def test_a_full_disk_is_told():
 # ---------------------------------------------------------------------- the screens
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", thinned(GRAPHS, 3))
 def test_the_screen_of_certify_fits_24_lines(name: str):
     (example, _, _) = select(name)[0]
@@ -786,7 +797,7 @@ def test_simulate_says_when_the_run_has_not_settled():
     assert "note" not in run.out
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("name", "magic"), [("a.png", b"\x89PNG\r\n\x1a\n"), ("a.svg", b"<?xml"), ("a.pdf", b"%PDF"), ("A.PNG", b"\x89PNG")]
 )
@@ -820,6 +831,7 @@ def test_max_input_is_met_refuted_or_undecided(most: str, code: int, says: str):
     assert run.code == code and says in run.out.splitlines()[-1]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("given", "most", "code", "says"),
     [
@@ -859,6 +871,7 @@ def test_max_input_under_a_limit_is_about_what_the_limit_leaves(folder: Path):
     assert ptcc(*words, "--gain-cap", "1", "--sample-period", "0.01", "--max-input", "3").code == 4
 
 
+@pytest.mark.few(0)
 @pytest.mark.usefixtures("every_class")
 def test_an_input_without_bound_is_said_prominently_and_refutes_every_limit():
     words = ("certify", "fig5b", "--T", "0.6", "--rho1", "0.1", "--rho2", "0.3", "--kappa", "1", "--no-simulation")
@@ -869,6 +882,7 @@ def test_an_input_without_bound_is_said_prominently_and_refutes_every_limit():
     assert refuted.code == 3 and "without limit, proved" in refuted.out.splitlines()[-1]
 
 
+@pytest.mark.few(0)
 def test_limits_of_actuators_are_judged_and_simulated(folder: Path):
     run = detailed(
         "certify", "fig1a", "--no-simulation", "--gain-cap", "20", "--sample-period", "1/1000", "--delta", "0.1"
@@ -940,6 +954,7 @@ def command_of(run: Run) -> str:
     return re.search(r"^to prove it again.*:\n(ptcc(.|\n)*)", run.out, re.M)[1].rstrip("\n").replace(" \\\n    ", " ")
 
 
+@pytest.mark.few(0)
 def test_the_command_that_design_prints_is_one_for_a_shell(folder: Path):
     name = "it's a $graph; -rf.csv"
     Path(name).write_text("a,b,-1\nb,a,-1\nb,b,2\na,b,-1\n")
@@ -996,6 +1011,7 @@ def rows_of_examples(run: Run) -> Iterator[tuple[str, str, str, re.Match[str]]]:
         yield number, graph, behaviour, match
 
 
+@pytest.mark.few(0)
 def test_all_examples_behave_as_the_paper_reports():
     assert len(list(rows_of_examples(ptcc("examples", "all")))) == 12
 
@@ -1040,6 +1056,7 @@ def test_examples_are_drawn_the_same_again(folder: Path):
     assert vectors_of_examples(folder, "one") == vectors_of_examples(folder, "two")
 
 
+@pytest.mark.few(0)
 def test_examples_can_be_chosen():
     assert [row.split()[1] for row in ptcc("examples", "2").out.splitlines()[2::2]] == ["fig3a", "fig3b"]
     assert [row.split()[1] for row in ptcc("examples", "fig1b").out.splitlines()[2::2]] == ["fig1b", "fig1b"]
@@ -1061,6 +1078,7 @@ def test_cite_is_bibtex_and_invents_nothing(theorem: str | None):
         assert f"Theorem {theorem}: " in fields["note"]
 
 
+@pytest.mark.few(0)
 def test_classify_loads_nothing_heavy():
     done = subprocess.run(
         [sys.executable, "-X", "importtime", "-m", "ptcc_certify.cli", "classify", "fig1a"],
@@ -1079,6 +1097,7 @@ def test_classify_loads_nothing_heavy():
 # ---------------------------------------------------------------------- progress
 
 
+@pytest.mark.few(0)
 def test_a_terminal_sees_which_step_is_at_work_and_standard_output_does_not(tmp_path: Path):
     """Standard error is a pseudo-terminal: a bar comes and goes; without one there is nothing."""
     pty = pytest.importorskip("pty")

@@ -58,7 +58,7 @@ def test_every_help_fits_80_columns(name: str):
     assert run.code == 0 and max(map(len, run.out.splitlines())) <= 80
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("words", [("ptcc_certify", "check"), ("ptcc_certify.checker",)])
 def test_nobody_who_reads_the_output_is_no_traceback_and_no_verdict(words: tuple[str, ...], certificate: str):
     """The code is that of other programs whose reader goes away; on a full disk it is that of bad input."""
@@ -76,6 +76,7 @@ def test_nobody_who_reads_the_output_is_no_traceback_and_no_verdict(words: tuple
         assert len(failed.stderr.splitlines()) == 1
 
 
+@pytest.mark.few(0)
 def test_the_package_runs_as_the_command():
     assert process("-m", "ptcc_certify", "cite", "2.1").out == ptcc("cite", "2.1").out
 
@@ -172,6 +173,7 @@ def test_a_graph_and_a_certificate_in_the_place_of_the_other_are_told_with_the_c
     assert ptcc("classify", "odd.csv").code == 0
 
 
+@pytest.mark.few(0)
 def test_standard_input_of_the_wrong_kind_is_named_as_a_file_is(certificate: str):
     content = Path(certificate).read_bytes()
     for words in (("classify", "-"), ("certify", "-"), ("certify", "-", "fig1a", "--switching")):
@@ -270,6 +272,7 @@ def test_steps_are_equal_and_end_at_the_deadline():
 # ---------------------------------------------------------------------- plot
 
 
+@pytest.mark.few(0)
 def test_every_figure_of_a_certificate_a_graph_and_a_scenario_is_drawn(certificate: str):
     Path("s.toml").write_text('[graph]\nfile = "team.csv"\n')
     for what in ("states", "input", "decay", "graph", "spectrum"):

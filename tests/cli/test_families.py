@@ -61,6 +61,7 @@ def test_what_every_signal_does_is_decided_on_the_command_line(words: tuple[str,
     assert run.code == 0 and claim in line, run
 
 
+@pytest.mark.few(0)
 def test_one_graph_with_known_weights_is_no_family():
     Path("known.csv").write_text(f"{INTERVALS}\na,b,1,1\nb,c,-1,-1\n")
     plain = ptcc("certify", "day.csv", "--no-simulation")
@@ -111,6 +112,7 @@ def test_a_certificate_of_one_graph_is_of_no_family():
         assert run.code == 1 and "one graph in the certificate, a family in the files" in " ".join(run.out.split()), run
 
 
+@pytest.mark.few(0)
 def test_intervals_with_equal_ends_are_the_graph_of_a_certificate():
     """A file of intervals may hold one graph, which certify takes for one, and check compares as one."""
     rows = [row.split(",") for row in FILES["day.csv"].split() if "source" not in row]
@@ -167,6 +169,7 @@ def test_files_are_read_as_the_reader_says():
     assert ptcc("check", "e.json").code == 0 and ptcc("check", "e.json", *BOTH).code == 1
 
 
+@pytest.mark.few(0)
 def test_a_scenario_lists_the_graphs_of_a_family():
     """Its certificate is that of the same flags, and is checked against the scenario."""
     run = ptcc("certify", "s.toml", "-o", "c.json")
@@ -188,7 +191,7 @@ def test_the_json_is_the_certificate_or_the_decision():
     assert [mode["name"] for mode in decision["modes"]] == ["day", "spoiled"]
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("words", "code", "says"),
     thinned(
@@ -269,6 +272,7 @@ def test_help_names_the_commands_that_take_families():
             assert "ptcc classify, certify, simulate and plot take it" in " ".join((run.out + run.err).split()), run
 
 
+@pytest.mark.few(0)
 def test_pages_statements_and_figures_are_made_of_the_certificate_of_a_family():
     assert ptcc("certify", *BOTH, "--kappa", "3", "--x0", "3,1,2", "-o", "c.json").code == 0
     for name in ("p.html", "p.tex"):
@@ -320,6 +324,7 @@ def _rows(*rows: str, header: str = INTERVALS) -> str:
     return "\n".join([header, *rows, ""])
 
 
+@pytest.mark.few(0)
 def test_a_family_is_certified_for_every_disturbance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
     Path("day.csv").write_text("a,b,1\nb,a,1\nb,c,-1\n")
@@ -344,6 +349,7 @@ def test_a_family_is_certified_for_every_disturbance(tmp_path: Path, monkeypatch
     assert "sigma(0) 0" in direct.out and "at 0.99 T" in direct.out and direct.code == 0
 
 
+@pytest.mark.few(0)
 def test_rows_with_intervals_that_are_always_zero_and_self_loops_are_dropped_where_asked(folder):
     Path("i.csv").write_text(_rows("a,b,1,2", "b,c,0,0.0", "c,c,1,2", "c,a,-2,-1"))
     dropped = ("--drop-zeros", "--drop-self-loops")
@@ -358,6 +364,7 @@ def test_rows_with_intervals_that_are_always_zero_and_self_loops_are_dropped_whe
     assert ptcc("check", "i.json", "same.csv").code == 0
 
 
+@pytest.mark.few(0)
 def test_a_file_of_intervals_in_which_all_weights_are_known_is_compared_as_its_sender_read_it(folder):
     Path("k.csv").write_text(_rows("lead,a,1,1", "a,b,2,2", "b,a,0,0", "b,b,1,2"))
     dropped = ("--drop-zeros", "--drop-self-loops")
@@ -373,6 +380,7 @@ def test_a_header_of_intervals_in_another_order_is_said_to_be_read(folder):
         assert said in " ".join(ptcc("certify", "i.csv").out.split())
 
 
+@pytest.mark.few(0)
 def test_columns_of_intervals_that_are_not_read_are_named_and_a_column_of_delays_where_none_is_asked_for(folder):
     Path("i.csv").write_text("source,target,min,max,lag,year\na,b,1,2,0.1,1999\nb,c,1,2,0.1,2000\n")
     told = " ".join(ptcc("certify", "i.csv").out.split())
@@ -525,6 +533,7 @@ def test_modes_are_called_by_their_files():
     assert "day, night: 2 modes" in ptcc("classify", *BOTH).out
 
 
+@pytest.mark.few(0)
 def test_a_file_that_is_given_twice_is_told():
     for command in ("classify", "certify"):
         run = ptcc(command, "day.csv", "night.csv", "day.csv", "--switching")
@@ -533,6 +542,7 @@ def test_a_file_that_is_given_twice_is_told():
         assert "given" not in ptcc(command, *BOTH).out
 
 
+@pytest.mark.few(0)
 def test_no_name_of_a_file_or_a_mode_steers_the_terminal():
     odd = "day\x1bc.csv"
     Path(odd).write_text(FILES["day.csv"])
@@ -634,6 +644,7 @@ def test_restricted_signals_are_keys_of_scenarios():
     assert run.code == 0 and "at least 0.2 of time between switches" in run.out, run
 
 
+@pytest.mark.few(0)
 def test_one_graph_that_switches_is_told_that_nothing_changes():
     run = ptcc("certify", "day.csv", "--switching", "--no-simulation")
     assert run.code == 0 and run.err == (
@@ -648,6 +659,7 @@ def test_a_family_is_called_by_its_files_without_their_folders(tmp_path: Path):
     assert line.startswith("family     unsure.csv: 3 nodes"), line
 
 
+@pytest.mark.few(0)
 def test_a_check_without_graphs_tells_of_which_family_the_certificate_speaks():
     assert ptcc("certify", *BOTH, "-o", "c.json", "-q").code == 0
     digest = json.loads(Path("c.json").read_text())["problem"]["graph"]["sha256"]
@@ -656,6 +668,7 @@ def test_a_check_without_graphs_tells_of_which_family_the_certificate_speaks():
     assert "as in the file; name" not in ptcc("check", "c.json", *BOTH).out
 
 
+@pytest.mark.few(0)
 def test_a_share_that_was_typed_as_a_percentage_is_one_in_the_check():
     assert ptcc("certify", "day.csv", "--uncertainty", "20%", "-o", "c.json", "-q").code == 0
     assert "--uncertainty 20%" in " ".join(ptcc("check", "c.json", "day.csv", "--uncertainty", "0.2").out.split())

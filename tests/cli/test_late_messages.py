@@ -66,6 +66,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.few(0)
 def test_a_certificate_with_late_messages_is_accepted_and_read_back_as_it_was_made() -> None:
     run = ptcc("certify", "team.csv", "--delay", "delay", *START, *QUICK, "-o", "c.json")
     assert run.code == 0, run
@@ -82,6 +83,7 @@ def test_a_certificate_with_late_messages_is_accepted_and_read_back_as_it_was_ma
     assert np.abs(motion.states[:, -1] - [1, 1, 1, -1]).max() <= late.largest
 
 
+@pytest.mark.few(0)
 def test_a_behaviour_asked_for_at_T_is_refuted_where_an_agent_is_proved_to_miss_it() -> None:
     run = ptcc("certify", "team.csv", "--delay", "0.02", *START, *QUICK, "--expect", "bipartite-consensus")
     assert run.code == 3, run
@@ -132,6 +134,7 @@ def test_no_delay_is_told_that_the_check_does_not_accept(monkeypatch: pytest.Mon
     assert "older" not in ptcc("certify", *words).out
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -159,6 +162,7 @@ def test_what_holds_without_late_messages_and_with_leaders_at_rest_is_not_said_t
     assert run.code == (3 if said.startswith("refuted") else 4), run
 
 
+@pytest.mark.few(0)
 def test_a_behaviour_and_an_input_are_met_where_they_are_proved_of_late_messages_and_moving_leaders() -> None:
     capped = ptcc("certify", "team.csv", "--delay", "0.005", "--gain-cap", "50", "--max-input", "1e6", *START, *QUICK)
     assert capped.code == 0 and "met: |u_k| <= 1000000" in " ".join(capped.out.split()), capped
@@ -178,6 +182,7 @@ def test_followers_without_a_cycle_are_told_deadlines_of_stages() -> None:
     assert "information takes longer than T" in " ".join(late.out.split())
 
 
+@pytest.mark.few(0)
 def test_a_scenario_holds_what_the_flags_say() -> None:
     flags = ("--delay", "0.005", "--period", "0.01", "--packet-loss", "3", "--quantisation", "0.1")
     Path("s.toml").write_text(
@@ -202,7 +207,7 @@ def test_followers_track_leaders_that_move_and_the_file_says_so() -> None:
     assert "ever after" in sign.out
 
 
-@pytest.mark.few(3)  # one of each option
+@pytest.mark.few(1)  # one of each option
 @pytest.mark.parametrize(
     ("rows", "words"),
     [
@@ -323,6 +328,7 @@ def test_a_delay_of_a_row_that_is_no_number_is_named_by_its_line() -> None:
     assert 'odd.csv, line 2: delay "soon" of edge a -> b is not a number; give a number >= 0' in run.err
 
 
+@pytest.mark.few(0)
 def test_small_delays_of_a_leader_group_are_certified_under_a_cap_up_to_a_limit_that_is_told() -> None:
     group, protocol = SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1), (2, 3, -1)]), NominalProtocol(1, 1, 2, 1)
     cert = certify(
@@ -445,6 +451,7 @@ def test_an_input_that_is_not_bounded_while_leaders_move_is_told_with_the_gain_t
     assert f"the input is not proved bounded; --rho2 {least[1]} bounds the input" in verdict
 
 
+@pytest.mark.few(0)
 def test_the_verdict_with_late_messages_is_about_these_and_proposes_no_gains_for_messages_at_once() -> None:
     weak = (*PAPER, "--rho2", "0.1", "--kappa", "1")
     for words, caveat in (((), "the input is not proved bounded"), (("--gain-cap", "1"), "")):
@@ -453,6 +460,7 @@ def test_the_verdict_with_late_messages_is_about_these_and_proposes_no_gains_for
         assert caveat in verdict and "--rho2" not in verdict, run
 
 
+@pytest.mark.few(0)
 def test_a_delay_that_would_do_is_told_as_an_age() -> None:
     lost = ("--delay", "0.005", "--period", "0.01", "--packet-loss", "3", "--max-residual", "0.001")
     run = ptcc("certify", "team.csv", *lost, *START, *QUICK)
@@ -492,6 +500,7 @@ def table(text: str) -> dict[str, np.ndarray]:
     return dict(zip(head, np.array(rows, dtype=float).T, strict=True))
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("words", "messages", "pattern"),
     [
@@ -538,6 +547,7 @@ def test_simulate_runs_leaders_that_move_with_their_targets() -> None:
     )
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("words", [("--delay", "0.1"), ("--leader-speed", "1")])
 def test_simulate_draws_such_runs_and_takes_them_from_a_scenario(words: tuple[str, ...]) -> None:
     assert ptcc("simulate", "team.csv", *words, *START, "-o", "run.png").code == 0
@@ -624,6 +634,7 @@ def test_page_and_statement_tell_of_late_messages_and_moving_leaders() -> None:
     assert "every follower on its target at $T = 1$" in Path("l.tex").read_text()
 
 
+@pytest.mark.few(0)
 def test_the_figure_that_is_drawn_unasked_is_of_what_the_certificate_claims() -> None:
     assert ptcc("certify", "chain.csv", "--leader-speed", "1", "--x0", "1,0,2", *QUICK, "-o", "l.json").code == 0
     assert ptcc("plot", "l.json").code == 0 and Path("l-tracking.png").exists()
@@ -633,12 +644,14 @@ def test_the_figure_that_is_drawn_unasked_is_of_what_the_certificate_claims() ->
     assert ptcc("plot", "random.json").code == 0 and Path("random-late.png").exists()
 
 
+@pytest.mark.few(0)
 def test_delays_that_are_too_short_to_run_have_a_page_and_a_figure_of_the_bound() -> None:
     assert ptcc("certify", "chain.csv", "--delay", "1e-5", "--x0", "1,0,2", *QUICK, "-o", "c.json").code == 0
     assert ptcc("report", "c.json", "-o", "c.html").code == ptcc("plot", "c.json", "--what", "late").code == 0
     assert "ask for --what late or states or input or decay" in ptcc("plot", "c.json", "--what", "formation").err
 
 
+@pytest.mark.few(0)
 def test_components_are_claimed_of_messages_at_once_too() -> None:
     Path("two.csv").write_text("source,target,weight\na,b,1\nc,d,-1\nd,e,1\n")
     assert "\n           nothing late\n" in ptcc("certify", "two.csv", "--delay", "0.1", *QUICK).out
@@ -680,6 +693,7 @@ def test_late_messages_ask_for_sliding_variables_at_0() -> None:
 GROUP = ("group.csv", "--x0", "1,2,3", "--gain-cap", "20", "--expect", "bipartite-consensus", *QUICK)
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("words", "said"),
     thinned(
@@ -726,6 +740,7 @@ def of_group() -> str:
     return Path("c.json").read_text()
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("asked", [None, 3, {}, {"messages": 1}, {"messages": {"latency": [], "packets": None}}])
 def test_what_a_file_says_of_messages_that_were_asked_for_may_be_of_any_content(asked: object) -> None:
     data = json.loads(of_group())
@@ -796,6 +811,7 @@ def test_vehicles_that_exchange_virtual_positions_are_certified_checked_drawn_an
     assert family.code == 0 and "for every signal, of virtual positions" in " ".join(family.out.split())
 
 
+@pytest.mark.few(0)
 def test_the_page_of_vehicles_that_hear_at_once_draws_them_with_leaders_that_move():
     asked = (*QUICK, *START, *VEHICLES, "--leader-speed", "0.5", "--gain-cap", "20")
     assert ptcc("certify", "team.csv", *asked, "-o", "c.json").code == 0
@@ -850,6 +866,7 @@ def test_a_figure_of_the_motion_of_vehicles_is_refused_with_those_that_are_drawn
         cert.plot(what)
 
 
+@pytest.mark.few(0)
 def test_the_rate_of_vehicles_that_hear_at_once_is_not_left_open_for_late_messages():
     words = ("team.csv", *START, *VEHICLES, "--gain-cap", "20", "--min-rate", "0.1")
     text = " ".join(ptcc("certify", *words).out.split())
@@ -868,6 +885,7 @@ def test_a_rate_of_a_family_is_told_where_the_check_accepts_it_though_not_all_is
     assert cert.refused
 
 
+@pytest.mark.few(0)
 def test_vehicles_that_begin_on_their_targets_with_velocities_are_judged_by_the_way_on_which_they_brake():
     Path("pair.csv").write_text("source,target,weight\na,b,1\nb,c,-1\n")
     words = ("--x0", "2,2,-2", "--agents", "double-integrator", "--exchange", "virtual", "--gain-cap", "200")
@@ -901,6 +919,7 @@ def test_under_a_cap_leaders_that_move_are_nearly_tracked_and_no_behaviour_is_me
     assert met.code == 0 and "met: bipartite containment" in " ".join(met.out.split())
 
 
+@pytest.mark.few(0)
 def test_a_sign_term_takes_up_how_leaders_move_where_messages_are_late_too() -> None:
     asked = ("certify", "team.csv", *QUICK, *START, "--leader-speed", "0.5", "--delay", "0.01")
     signed, plain = ptcc(*asked, "--sign-gain", "0.5", "-o", "s.json"), ptcc(*asked, "-o", "p.json")

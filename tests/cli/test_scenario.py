@@ -90,6 +90,7 @@ def test_the_certificate_records_its_scenario_and_what_overrode_it():
     assert json.loads(Path("d.json").read_text())["unverified"]["scenario"] is None
 
 
+@pytest.mark.few(0)
 def test_a_scenario_gives_what_flags_would_give():
     flags = ("--T", "2", "--rho1", "0.1", "--x0", "ann=5,bob=2,eve=4.25,dan=-1/3")
     assert ptcc("simulate", write()).out == ptcc("simulate", "my data/team.csv", *flags).out

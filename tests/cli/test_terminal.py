@@ -28,6 +28,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", [*GRAPHS][::2])
 def test_short_screens_fit_8_lines_of_80_columns_and_long_ones_80_columns(name: str):
     ptcc("certify", name, *FAST, "-o", "c.json", "-q")
@@ -38,6 +39,7 @@ def test_short_screens_fit_8_lines_of_80_columns_and_long_ones_80_columns(name: 
         assert max(cell_len(line) for line in (short.out + long.out).splitlines()) <= 80
 
 
+@pytest.mark.few(0)
 def test_design_says_what_was_asked_what_is_met_and_how_to_prove_it_again():
     for task, code in (("--shortest-deadline",), 0), (("--deadline", "0.7"), 3), (("--deadline", "0.9"), 4):
         short, long = ptcc(*DESIGN, *task), ptcc(*DESIGN, *task, "-v")
@@ -127,7 +129,7 @@ def test_work_that_lasts_says_where_it_is_without_a_terminal(
     assert capsys.readouterr().err == ""
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("words", "steps"),
     [
@@ -216,6 +218,7 @@ def test_check_tells_deadline_bounds_and_input_as_certify_does():
     assert [line.split()[0] for line in bare[2:]] == ["claim", "accepted"]
 
 
+@pytest.mark.few(0)
 def test_check_names_the_agent_of_the_largest_input_of_a_design():
     rows = ("source,target,weight", "m1,m2,1", "m2,m1,-1", "m2,m3,1", "m3,m4,-2", "m4,m5,1", "m5,m3,-1")
     Path("team.csv").write_text("\n".join(rows))

@@ -82,6 +82,7 @@ def test_where_the_executable_is_absent_one_line_says_how_to_build_it(monkeypatc
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.few(0)
 def test_the_paper_s_examples_are_accepted_and_every_obligation_is_verified_or_named(tmp_path: Path) -> None:
     program()
     for text in paper_examples():
@@ -98,6 +99,7 @@ def test_the_paper_s_examples_are_accepted_and_every_obligation_is_verified_or_n
         assert {o["kind"] for o in document["proof"]} - {o.kind for o in report.obligations} <= SKIPPED | moving
 
 
+@pytest.mark.few(0)
 def test_no_stored_certificate_is_rejected() -> None:
     """Not either of weights over many magnitudes; of what this checker does not read it says so."""
     program()
@@ -129,6 +131,7 @@ def test_the_input_is_spoken_of_iff_a_decay_was_proved(tmp_path: Path) -> None:
         assert code == 1 and "there is no input" in text and not check(forged).accepted
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("family", [False, True], ids=["graph", "family"])
 def test_a_part_that_is_absent_is_absent_and_what_is_asked_stands_under_problem(family: bool, tmp_path: Path) -> None:
     """A key that may be absent is not there with null, none stands where it stood before, and no empty numbers."""
@@ -176,6 +179,7 @@ def test_a_part_that_is_absent_is_absent_and_what_is_asked_stands_under_problem(
         assert said(mutant, tmp_path).code == 1 and not check(mutant).accepted, mutant
 
 
+@pytest.mark.few(0)
 def test_what_cannot_be_read_or_told_takes_one_line_and_bounded_memory(tmp_path: Path) -> None:
     program()
     file = tmp_path / "c.json"
@@ -266,6 +270,7 @@ def test_ends_of_the_spectrum_are_part_of_the_theorem() -> None:
     assert "lowest f" in claim and "highest f" in claim and "qbil P z z" in claim
 
 
+@pytest.mark.few(0)
 def test_late_messages_of_leaders_that_move_are_named_with_all_their_obligations(tmp_path: Path) -> None:
     program()
     edges, late = [("l", "a", 1), ("a", "b", 1), ("b", "a", 1), ("m", "b", 2)], LateMessages(delay="0.02")
@@ -316,6 +321,7 @@ def many_components() -> dict:
     return json.loads(certify(edges, NominalProtocol(1, 1, 1, 2), asks=Asks(simulation=False)).to_json())
 
 
+@pytest.mark.few(0)
 def test_the_claims_of_more_than_100_weak_components_are_verified(tmp_path: Path) -> None:
     program()
     document = many_components()
@@ -382,6 +388,7 @@ def without_efforts(document: dict[str, Any]) -> dict[str, Any]:
     return resealed({**document, "input": rest, "proof": proof})
 
 
+@pytest.mark.few(0)
 def test_reaching_times_are_verified_and_shorter_ones_are_rejected(tmp_path: Path) -> None:
     program()
     gains = {"T_r": "0.5", "T_s": 1, "rho1": 1, "rho2": 1, "kappa": 2, "mu1": 2, "mu2": 1, "delta": 1}
@@ -425,6 +432,7 @@ def test_reaching_times_far_away_are_named(tmp_path: Path) -> None:
     assert code == 0 and "not checked reaching-time of reaching_time" in text and "not checked reaching_time.z" in text
 
 
+@pytest.mark.few(0)
 def test_what_the_sliding_mode_adds_to_the_input_is_verified(tmp_path: Path) -> None:
     program()
     gains = {"T_r": "0.5", "T_s": 1, "rho1": 1, "rho2": 1, "kappa": 2, "mu1": 2, "mu2": 1, "delta": 1}
@@ -463,6 +471,7 @@ def test_what_the_sliding_mode_adds_to_the_input_is_verified(tmp_path: Path) -> 
             assert said(forged, tmp_path).code == 1 and not check(forged).accepted, path
 
 
+@pytest.mark.few(0)
 @every(3)
 def test_which_balanced_components_end_at_0_is_verified(every: int, tmp_path: Path) -> None:
     program()
@@ -583,6 +592,7 @@ def scaled(document: dict[str, Any], key: str, share: Fraction, label: str | Non
     return resealed(changed(document, ("input", "peak"), new))
 
 
+@pytest.mark.few(0)
 @every(3)
 @pytest.mark.parametrize("gains", thinned([{}, {"rho1": 3, "delta": "0.25", "mu3": 4}], 2))
 def test_while_sliding_variables_move_what_the_input_takes_is_verified(
@@ -634,6 +644,7 @@ def about_efforts(document: dict[str, Any], path: tuple[str | int, ...]) -> bool
     )
 
 
+@pytest.mark.few(0)
 @every(40)
 def test_of_mutants_of_what_the_input_takes_none_is_accepted_unless_true_or_named(every: int, tmp_path: Path) -> None:
     program()
@@ -644,6 +655,7 @@ def test_of_mutants_of_what_the_input_takes_none_is_accepted_unless_true_or_name
         compare(mutant, path, tmp_path)
 
 
+@pytest.mark.few(0)
 def test_of_sliding_variables_that_are_0_the_peak_has_what_the_sliding_mode_adds(tmp_path: Path) -> None:
     program()
     protocol = SlidingModeProtocol(**MOVING)
@@ -677,7 +689,7 @@ def of_box(name: str, protocol: Any, sigma0: Any = None) -> dict[str, Any]:
     return json.loads(made.to_json())
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", BOXES)
 def test_what_the_input_takes_over_a_box_of_initial_states_is_verified(name: str, tmp_path: Path) -> None:
     program()
@@ -702,6 +714,7 @@ def test_what_the_input_takes_over_a_box_of_initial_states_is_verified(name: str
         assert not check(mutant).accepted and said(mutant, tmp_path).code == 1
 
 
+@pytest.mark.few(0)
 def test_efforts_of_other_sets_of_initial_states_are_named(tmp_path: Path) -> None:
     program()
     center = [Fraction(x) for x in (1, 2, 3, -4)]
@@ -729,6 +742,7 @@ def test_of_mutants_of_a_box_of_initial_states_none_is_accepted_unless_true_or_n
         compare(mutant, path, tmp_path)
 
 
+@pytest.mark.few(0)
 def test_limits_disturbance_and_noise_are_named_and_none_can_be_added(tmp_path: Path) -> None:
     program()
     limits = [GainLimits(gain_cap=10), GainLimits(stop_before="0.1"), GainLimits(sample_period="0.001")]
@@ -761,6 +775,7 @@ def test_no_text_of_the_file_is_printed_as_a_line_of_its_own(tmp_path: Path) -> 
     assert report.accepted and "decays[99]" not in {o.of for o in report.obligations}
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("number", thinned(range(12)))
 def test_of_some_mutants_none_is_accepted_unless_true_or_not_checked(number: int, tmp_path: Path) -> None:
     program()
@@ -779,6 +794,7 @@ def test_of_thousands_of_mutants_none_is_accepted_unless_true_or_not_checked(num
     assert count > 3000 // every
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("weights", WEIGHTS)
 def test_weights_of_any_size_and_length_are_taken(weights: str, tmp_path: Path) -> None:
     """Of long weights matrices of integers have thousands of bits."""

@@ -50,7 +50,7 @@ SETTINGS = {
 UNREAD = ("large form", "undecided", "radius", "dominance", "weak components")
 
 
-@pytest.mark.few(11)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", SETTINGS)
 def test_certificates_of_agents_are_accepted_and_every_obligation_is_verified(name: str, tmp_path: Path) -> None:
     program()
@@ -87,6 +87,7 @@ def test_a_formation_of_single_integrators_is_told_in_one_line(tmp_path: Path) -
     assert code == 2 and "formation" in text and "use ptcc check" in text and text.count("\n") == 1
 
 
+@pytest.mark.few(0)
 def test_phases_are_named_as_not_checked_and_the_rest_is_verified(tmp_path: Path) -> None:
     program()
     agents = Agents(order=3, drag="1/3")
@@ -149,6 +150,7 @@ def refused(document: Json, path: tuple[str | int, ...], new: Any, where: str, f
     assert code == 1 and where in text, (path, text)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", ["capped gain", "capped gain, slow decay", "capped from the beginning"])
 def test_what_is_forged_under_a_cap_is_rejected_by_both_checkers(name: str, tmp_path: Path) -> None:
     program()
@@ -181,6 +183,7 @@ def test_what_is_forged_under_a_cap_is_rejected_by_both_checkers(name: str, tmp_
         assert check(weaker).accepted and said(weaker, tmp_path).code == 0
 
 
+@pytest.mark.few(0)
 @every(3)
 def test_where_agents_that_meet_at_rest_end_is_verified_and_what_is_forged_of_it_is_rejected(
     every: int, tmp_path: Path
@@ -222,7 +225,7 @@ def test_where_agents_that_meet_at_rest_end_is_verified_and_what_is_forged_of_it
     assert code == 1
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     "setting",
     [
@@ -256,6 +259,7 @@ def test_where_agents_that_move_by_themselves_end_is_verified_and_what_is_forged
         refused(document, ("agents", "final_state", "f", 0, i), str(middle), "agent-final-state", tmp_path)
 
 
+@pytest.mark.few(0)
 def test_the_input_of_agents_that_meet_at_rest_is_verified_and_what_is_forged_of_it_is_rejected(tmp_path: Path) -> None:
     program()
     tight = {
@@ -374,7 +378,7 @@ def sharper(setting: Setting) -> Any:
     return known
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", ["double integrators", "drag in the plane", "at rest", "capped gain"])
 def test_of_some_mutants_of_agents_none_is_accepted_unless_true_or_not_checked(name: str, tmp_path: Path) -> None:
     program()

@@ -74,6 +74,7 @@ def made(name: str) -> Json:
     return document(SignedDigraph.from_edges(GRAPHS[kind]), *rest)
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", SETTINGS)
 def test_certificates_of_the_cascade_are_accepted_and_every_obligation_is_verified(name: str, tmp_path: Path) -> None:
     program()
@@ -129,6 +130,7 @@ def middle(interval: Any) -> Fraction:
     return F(interval["mid"] if isinstance(interval, dict) else interval)
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", ["plain", "formation in the plane", "every function", "sliding variables"])
 def test_what_is_forged_is_rejected_by_both_checkers(name: str, tmp_path: Path) -> None:
     program()
@@ -184,6 +186,7 @@ def test_velocities_that_need_not_vanish_and_inputs_without_a_bound_are_rejected
         assert code == 1 and "agent-input" in text
 
 
+@pytest.mark.few(0)
 def test_the_common_motion_is_verified_however_strong_the_damping(tmp_path: Path) -> None:
     program()
     for alpha in (25, "12345678901234567/1000000000000000"):
@@ -230,6 +233,7 @@ def test_a_cascade_on_a_large_form_is_told_in_one_line(tmp_path: Path) -> None:
     assert code == 2 and "large form" in text and "use ptcc check" in text and text.count("\n") == 1
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", ["plain", "formation in the plane", "sliding variables"])
 def test_of_some_mutants_of_the_cascade_none_is_accepted_unless_true_or_not_checked(name: str, tmp_path: Path) -> None:
     program()
@@ -263,7 +267,7 @@ def random_document(seed: int) -> Json:
     return document(graph, protocol, {"cascade": alpha, "method": method, "offsets": seed % 3 == 0}, seed % 4, seed)
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("seed", [3, 14, 25, 41])
 def test_what_the_checker_accepts_of_graphs_of_some_classes_the_verified_one_accepts(seed: int, tmp_path: Path) -> None:
     program()

@@ -195,7 +195,7 @@ def narrower(entry: Any) -> list[Any]:
     ]
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("protocol", [NOMINAL, SLIDING], ids=["nominal", "sliding"])
 @pytest.mark.parametrize("name", ENDING)
 def test_agents_end_in_their_intervals_and_no_narrower_one_is_accepted(
@@ -214,6 +214,7 @@ def test_agents_end_in_their_intervals_and_no_narrower_one_is_accepted(
             assert code == 1 and "family-final-state" in text
 
 
+@pytest.mark.few(0)
 def test_while_sliding_variables_move_the_ends_of_kept_means_are_verified_and_others_named(tmp_path: Path) -> None:
     program()
     for name, verified in (("undirected", True), ("uncertain weights", False)):
@@ -308,7 +309,7 @@ def test_without_functions_a_common_kernel_that_is_none_is_rejected(tmp_path: Pa
         assert code == 1 and "claim" in text, text
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("kind", DEPENDING)
 def test_that_a_component_depends_on_the_signal_is_verified_by_its_witness(kind: str, tmp_path: Path) -> None:
     program()
@@ -358,6 +359,7 @@ def with_witness(found: Json, behaviour: str, witness: Any) -> Json:
     return resealed(changed(changed(found, ("claim", "behaviour"), behaviour), ("proof", place, "witness"), witness))
 
 
+@pytest.mark.few(0)
 def test_a_behaviour_that_comes_after_the_one_that_fits_is_rejected(tmp_path: Path) -> None:
     program()
     stable = document(Family.from_intervals([("a", "b", 1, 2), ("b", "a", -1, -1), ("b", "c", -2, -1)]))
@@ -371,6 +373,7 @@ def test_a_behaviour_that_comes_after_the_one_that_fits_is_rejected(tmp_path: Pa
         assert code == 1 and "claim" in text
 
 
+@pytest.mark.few(0)
 def test_what_drives_and_peaks_are_due_of_is_neither_added_nor_left_out(tmp_path: Path) -> None:
     program()
     quiet = json.loads(signed())
@@ -401,6 +404,7 @@ def test_a_weight_of_the_other_sign_is_rejected(tmp_path: Path) -> None:
     assert code == 1 and "SHA-256" in text
 
 
+@pytest.mark.few(0)
 def test_of_some_mutants_of_a_family_none_is_accepted_unless_true_or_not_checked(tmp_path: Path) -> None:
     program()
     found = json.loads(signed())

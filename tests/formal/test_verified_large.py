@@ -81,6 +81,7 @@ def compare(document: Json, path: tuple, folder: Path) -> bool:
     return False
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", ["3.1 all single", "2.1 K=1", "3.1 mixed", "1.1"])
 def test_a_large_form_is_accepted_and_what_is_proved_of_it_is_named(name: str, tmp_path: Path) -> None:
     for sliding in (False, True):
@@ -167,6 +168,7 @@ def factors(document: Json) -> Iterator[tuple[tuple, Json]]:
                     yield ("proof", i, "witness", "groups", k, "factor"), entry["factor"]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("kind", ["whole", "pinned", "tree"])
 def test_a_leader_group_is_proved_by_its_factor_and_by_no_other(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -285,6 +287,7 @@ def test_an_undecided_certificate_is_not_read(tmp_path: Path) -> None:
     assert code == 2 and "undecided" in text
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", ["3.1 all single", "2.2"])
 def test_of_some_mutants_of_a_large_form_none_is_accepted_unless_true(name: str, tmp_path: Path) -> None:
     document = made(name)

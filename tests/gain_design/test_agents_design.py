@@ -72,7 +72,7 @@ def fresh(answer: AgentsDesign, T: Fraction, x0: Any, v0: Any, graph: Any = TRIO
     return Candidate(T, protocol, part)
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", CASES)
 def test_the_checker_reads_inputs_within_the_limit(name: str):
     answer, limit = designed(name), CASES[name][2]
@@ -86,7 +86,7 @@ def test_the_checker_reads_inputs_within_the_limit(name: str):
         assert answer.residual == max(left) <= answer.asked.residual
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", CASES)
 def test_a_deadline_that_is_shorter_by_two_hundredths_is_not_proved_to_keep_the_limit(name: str):
     answer = designed(name)
@@ -95,7 +95,7 @@ def test_a_deadline_that_is_shorter_by_two_hundredths_is_not_proved_to_keep_the_
     assert not answer.asked.met_by(fresh(answer, answer.deadline * Fraction(98, 100), X0, CASES[name][3].get("v0")))
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", CASES)
 def test_a_run_keeps_the_limit(name: str):
     answer = designed(name)
@@ -143,6 +143,7 @@ def test_the_shortest_time_in_space_is_that_of_the_straight_way():
     assert plane == line
 
 
+@pytest.mark.few(0)
 def test_a_deadline_below_the_shortest_possible_one_is_infeasible():
     possible = designed("double").shortest_possible
     assert possible is not None and possible < designed("double").too_short
@@ -175,6 +176,7 @@ def test_what_is_missing_whatever_the_deadline_is_named():
     assert unstable.verdict == UNPROVED and "no deadline that was tried keeps the limit" in unstable.binding
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("cascade", [None, 2])
 def test_agents_in_place_need_no_input(cascade: int | None):
     agents = Agents(order=2, offsets=PLACES, cascade=cascade)
@@ -182,6 +184,7 @@ def test_agents_in_place_need_no_input(cascade: int | None):
     assert answer.verdict == MET and answer.peak == 0 and "no input" in answer.binding
 
 
+@pytest.mark.few(0)
 def test_agents_in_agreement_that_must_come_to_rest_need_an_input():
     together = {"a": [1, 1], "b": [1, 1], "c": [-1, -1]}
     answer = design_agents(TRIO, Agents(order=2, rest=2), InitialState(together, v0=together), max_input=3)

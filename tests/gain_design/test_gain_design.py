@@ -124,6 +124,7 @@ TASKS += [(name, 10, 1, {"deadline": 8}) for name in (*GRAPHS, "pair", "random2"
 TIGHTENED = [task for task in TASKS if "deadline" not in task[3] and (not task[3] or "fig5" not in task[0])]
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("name", "U", "R", "asked"), thinned(TASKS, 8), ids=str)
 def test_a_design_is_certified_and_holds_in_simulations(name, U, R, asked):
     found = designed(name, U, R, **asked)
@@ -145,6 +146,7 @@ def test_real_graphs(real_data, file):
     assert_holds_in_simulations(graph, found, 1)
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("name", "U", "R", "asked"), thinned(TIGHTENED, 8), ids=str)
 def test_what_binds_cannot_be_tightened(name, U, R, asked):
     found = designed(name, U, R, **asked)
@@ -175,6 +177,7 @@ def test_a_shorter_deadline_is_worth_more_than_gains_that_certify_proves_again(m
     assert found.certificate.checked.accepted and not found.repeatable and found.certify_options is None
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", ["pair", "fig1b"])
 def test_a_smaller_residual_takes_longer(name):
     times = [designed(name, 20, 3, residual=r).deadline for r in ("2.9", "2.755", "2.5", "0.1", "0.001")]
@@ -207,6 +210,7 @@ def test_below_the_bound_every_gain_fails(name):
         assert largest > 10
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", thinned([*GRAPHS, "trio"], 3))
 def test_the_lower_bound_is_nearly_reached_and_the_certificate_not_far_off(name):
     """Gains with a small ``rho1`` and the least ``rho2 kappa`` come near the bound, by simulation."""
@@ -265,6 +269,7 @@ def test_a_large_graph_is_answered():
     assert found.verdict == UNPROVED and "401" in found.binding
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("factor", [Fraction(1, 10**9), Fraction(10**9)])
 def test_units_of_weights_and_states_do_not_matter(factor):
     scaled = SignedDigraph.from_edges([(1, 2, 3 * factor), (2, 3, -factor), (3, 1, factor)])
@@ -326,6 +331,7 @@ def test_the_peak_is_convex_in_rho1():
             assert between <= chord * (1 + 1e-12)
 
 
+@pytest.mark.few(0)
 def test_the_search_finds_the_least_peak_and_newton_the_crossing():
     rng = np.random.default_rng(2)
     for _ in range(20):
@@ -348,6 +354,7 @@ def test_for_one_agent_the_smallest_pole_is_best():
                 assert best <= m * peak_factor(a / m, np.array([clock / m]), np.ones(1)) * (1 + 2e-3)
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", ["fig1a", "fig5b", "trio"])
 def test_the_bound_scales_with_one_over_the_deadline(name):
     found = designed(name, 10, 1)
@@ -363,6 +370,7 @@ def test_the_bound_scales_with_one_over_the_deadline(name):
     assert (curve.lower < curve.certified).all()
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", ["fig1a", "fig3b", "random5"])
 def test_random_gains_are_not_certified_with_a_smaller_peak(name):
     found = designed(name, 10, 1)

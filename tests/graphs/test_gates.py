@@ -119,6 +119,7 @@ def test_a_graph_that_has_its_orientation_takes_no_other():
         as_graph(TEAM, "listens")
 
 
+@pytest.mark.few(0)
 def test_every_function_takes_a_graph_in_every_form():
     W, x0 = TEAM.adjacency().toarray(), [5, 2, -4]
     cert = ptcc.certify(ptcc.as_graph(W, "listens"), PROTOCOL, x0, asks=ptcc.Asks(simulation=False))

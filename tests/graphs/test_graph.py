@@ -50,6 +50,7 @@ def build(names, weights, **options) -> SignedDigraph:
 # ---------------------------------------------------------------------------------------------- weights and order
 
 
+@pytest.mark.few(0)
 @given(edge_lists())
 def test_edges_come_back_exactly_sorted_by_listener(made):
     names, weights = made
@@ -169,6 +170,7 @@ def test_the_laplacian_is_the_signed_one(made):
     assert np.array_equal(laplacian, np.diag(graph.in_weight()) - graph.adjacency().toarray())
 
 
+@pytest.mark.few(0)
 @given(edge_lists(st.integers(0, 30).map(str)))
 def test_matrix_networkx_and_edges_give_the_same_graph(made):
     names, weights = made
@@ -274,6 +276,7 @@ def test_a_matrix_without_a_direction_is_refused_with_both():
         SignedDigraph.from_matrix(nx.DiGraph([(1, 2)]), orientation="information")
 
 
+@pytest.mark.few(0)
 @given(edge_lists(st.integers(0, 30).map(str)))
 def test_a_matrix_of_networkx_with_its_orientation_is_the_networkx_graph(made):
     names, weights = made

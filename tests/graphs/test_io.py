@@ -279,6 +279,7 @@ def plain(text: str) -> str:
     return text.strip() or "x"
 
 
+@pytest.mark.few(0)
 @given(graphs(odd_text.map(plain)), st.sampled_from(["g.csv", "g.csv.gz", "g", "g.txt"]))
 @example(SignedDigraph.from_edges([("source", "target", 1)], nodes=["weight"]), "g.csv")
 @example(SignedDigraph.from_edges([('"', "a\nb", 1), ("a\nb", "c\r\nd", -1), ("#", "%", 1)], nodes=["z"]), "g.csv")
@@ -294,6 +295,7 @@ def test_a_graph_is_read_back_as_it_was_written(tmp_path, graph, name):
     assert told == [f"{counted(alone, 'node')} without edges"][:alone]
 
 
+@pytest.mark.few(0)
 @given(graphs(odd_text.map(plain)))
 @settings(max_examples=60)
 def test_the_node_order_of_a_subgraph_survives_where_the_order_rule_allows(tmp_path_factory, graph):
@@ -332,6 +334,7 @@ def test_what_cannot_be_read_back_is_not_written(tmp_path, graph, name, reason):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.few(0)
 @given(
     graphs(
         st.text(st.characters(codec="utf-8", exclude_characters="\0\r\n", exclude_categories=["C", "Z"]), min_size=1)
@@ -443,6 +446,7 @@ def test_a_symmetric_matrix_market_file_is_undirected(tmp_path, dense):
     assert read_graph(tmp_path / "g.mtx", undirected=True) == SignedDigraph.from_matrix(matrix, orientation="listens")
 
 
+@pytest.mark.few(0)
 @given(st.integers(1, 6), st.data())
 @settings(max_examples=60)
 def test_a_dense_and_a_sparse_matrix_are_the_same_graph(tmp_path_factory, n, data):
@@ -1078,6 +1082,7 @@ def test_binary_formats_are_not_read_from_text():
         text("a", format="npy")
 
 
+@pytest.mark.few(0)
 @given(st.sampled_from(["csv", "graphml", "gml", "net", "mtx", "npy", "npz", "mat"]), st.data())
 @settings(max_examples=150)
 def test_a_damaged_file_gives_a_graph_or_one_line(kind, data):
@@ -1116,6 +1121,7 @@ def test_noise_gives_a_graph_or_one_line(noise):
         one_line(error)
 
 
+@pytest.mark.few(0)
 @given(st.text(st.sampled_from('ab01., \t;"#%\n\r-'), max_size=60))
 @settings(max_examples=200)
 def test_what_is_read_can_be_written_and_read_again(tmp_path_factory, content):
@@ -1238,6 +1244,7 @@ def test_a_missing_start_file_is_refused(tmp_path):
         read_state(tmp_path / "x0.csv", GRAPH)
 
 
+@pytest.mark.few(0)
 @given(graphs(odd_text.map(plain)), st.data())
 @settings(max_examples=80)
 def test_a_start_is_read_exactly_from_a_file_of_quoted_labels(tmp_path_factory, graph, data):

@@ -254,6 +254,7 @@ def constructed(name: str) -> Iterator[Made]:
         yield random_graph(rng, **(kwargs | changes))
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", thinned(CLASSES, 2))
 def test_every_field_agrees_with_the_definitions_and_with_the_construction(name):
     for made in constructed(name):
@@ -262,6 +263,7 @@ def test_every_field_agrees_with_the_definitions_and_with_the_construction(name)
         assert_agrees(structure, made.graph.n_nodes, weights_of(made.graph))
 
 
+@pytest.mark.few(0)
 def test_the_constructed_graphs_cover_every_class_and_size():
     cells, theorems, sizes, mixtures = Counter(), Counter(), Counter(), set()
     for name in CLASSES:
@@ -283,6 +285,7 @@ def test_the_constructed_graphs_cover_every_class_and_size():
     assert len([m for m in mixtures if len(m) > 1]) >= 12
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("negative", thinned([0.15, 0.0, 0.5, 1.0], 2))
 def test_random_sign_matrices_agree_with_the_definitions(negative):
     rng = np.random.default_rng(int(100 * negative))
@@ -325,7 +328,7 @@ def balanced_parts(n: int, edges: Iterable[tuple[int, int, int]]) -> list[bool]:
     return [find(v) not in torn for v in range(n)]
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("negative", thinned([0.3, 0.001, 0.0], 3))
 @pytest.mark.parametrize(
     ("mean_in_degree", "block"), thinned([(0.5, None), (1.0, None), (3.0, None), (1.5, 4), (2.0, 10)])
@@ -502,6 +505,7 @@ def signed_ring(n: int, reverse: np.ndarray, negative: int) -> SignedDigraph:
     return SignedDigraph(map(str, range(n)), source, target, Weights([Fraction(1), Fraction(-1)], code))
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("turned", [False, True])
 def test_the_witness_of_a_long_unbalanced_ring_goes_all_the_way_round(turned):
     n = 100_000

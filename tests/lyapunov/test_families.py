@@ -109,6 +109,7 @@ def test_a_state_at_rest_that_moves_elsewhere_has_no_quotient():
 # ---------------------------------------------------------------------- proved rates
 
 
+@pytest.mark.few(1)
 def test_the_proved_rate_holds_exactly_at_every_member_drawn(certified):
     quotient, functions, _ = certified
     rng, n = np.random.default_rng(1), len(quotient.nodes)

@@ -383,6 +383,7 @@ def test_samples_do_where_intervals_cannot(text: str):
     assert ExpressionDisturbance(text).check(ONE, LABELS, 3.0) == "sampling at 20,000 instants"
 
 
+@pytest.mark.few(0)
 def test_agents_that_intervals_cannot_decide_leave_the_others_bounded():
     stubborn = ["sin(t)**2 + cos(t)**2" + " + 0" * i for i in range(8)]
     last = "0.1*sqrt(sin(9*t)**2 - 2*sin(9*t) + 1.01)"  # needs bisection to be defined at all

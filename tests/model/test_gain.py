@@ -41,6 +41,7 @@ def test_the_logarithmic_derivative_of_phi_is_the_pole(gain, share):
     assert float(gain.rho1) + float(gain.rho2) * ratio == pytest.approx(float(gain.value(instant)), rel=1e-8)
 
 
+@pytest.mark.few(0)
 @settings(deadline=None)
 @given(GAINS, st.lists(SHARES | st.floats(1.001, 3), min_size=1, max_size=5))
 def test_numpy_functions_and_expressions_agree(gain, shares):

@@ -117,7 +117,7 @@ def test_what_cannot_be_drawn_is_told_in_words() -> None:
     assert "1 node, 0 edges" in shown(certify(still, PROTOCOL, [3])).text
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     "label", thinned(['"><img src=x onerror=alert(1)>', "<script>alert(1)</script>", "$x$", "&lt;b&gt;"], 2)
 )
@@ -129,6 +129,7 @@ def test_labels_are_shown_as_they_are(label: str) -> None:
         assert len(page.images) == 1
 
 
+@pytest.mark.few(0)
 def test_a_notebook_shows_a_figure_or_its_axes_without_pyplot():
     formatters = pytest.importorskip("IPython.core.formatters")
     pyplot = pytest.importorskip("matplotlib.pyplot")

@@ -92,6 +92,7 @@ def sliding(explorer: Explorer) -> Panel:
     return Panel(explorer, SLIDING.changed(graph="fig1a", method="paper"))
 
 
+@pytest.mark.few(0)
 def test_it_opens_with_a_certified_view(panel: Panel):
     assert panel.image.startswith(PNG)
     assert panel.line("claim").endswith("interval bipartite consensus at T = 1 (Theorem 2.1)")
@@ -115,6 +116,7 @@ def rows(view: View) -> dict[str, str]:
     return view.facts | {"verdict": view.verdict}
 
 
+@pytest.mark.few(0)
 def test_a_control_that_is_moved_changes_image_and_text(panel: Panel):
     before = panel.text, panel.image
     panel.set("T", 0.4)
@@ -124,6 +126,7 @@ def test_a_control_that_is_moved_changes_image_and_text(panel: Panel):
     assert "at T = 0.4 " in panel.line("claim")
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("name", "value"), [("T", 0.4), ("rho1", 0.8), ("rho2", 0.9), ("kappa", 1.5)])
 def test_gains_move_the_bound_and_leave_the_rate(explorer: Explorer, name: str, value: float):
     """Rates are per unit of the clock and belong to the graph; only the clock depends on the gains."""
@@ -146,6 +149,7 @@ def test_the_seed_decides_the_initial_state_and_with_it_the_final_state(explorer
     assert any("/3, " in end and end.endswith("(exact)") for end in ends)
 
 
+@pytest.mark.few(0)
 def test_every_packaged_graph_is_there(explorer: Explorer, panel: Panel):
     assert panel.controls["graph"].options == GRAPHS
     for name in GRAPHS:
@@ -156,6 +160,7 @@ def test_every_packaged_graph_is_there(explorer: Explorer, panel: Panel):
         assert view.verdict.startswith("certified"), name
 
 
+@pytest.mark.few(0)
 @pytest.mark.usefixtures("every_class")
 def test_a_class_of_bounds_shows_its_own_rate(explorer: Explorer):
     rates = {}
@@ -213,6 +218,7 @@ def test_a_given_graph_comes_first_and_is_shown():
 # ---------------------------------------------------------------------- sliding mode
 
 
+@pytest.mark.few(0)
 def test_the_protocol_brings_its_own_controls(explorer: Explorer):
     panel = Panel(explorer, Settings("fig1a", method="paper"))
     before = panel.text
@@ -246,6 +252,7 @@ MOVES = (
 )
 
 
+@pytest.mark.few(0)
 def test_every_control_of_the_sliding_mode_is_followed(explorer: Explorer):
     """In the text, in the run, or in the proved reaching times."""
     explorer.view(SLIDING)  # finds the Lyapunov functions that previews take
@@ -275,6 +282,7 @@ def test_a_larger_margin_reaches_the_manifold_earlier(explorer: Explorer):
     assert len(set(times)) == len(times)
 
 
+@pytest.mark.few(0)
 def test_the_final_state_is_the_same_whatever_the_disturbance(explorer: Explorer):
     ends = set()
     for disturbance in ("worst-case", "none", "sin", "telegraph"):
@@ -284,6 +292,7 @@ def test_the_final_state_is_the_same_whatever_the_disturbance(explorer: Explorer
     assert len(ends) == 1
 
 
+@pytest.mark.few(0)
 def test_what_is_wrong_is_told_in_one_line_and_drawn(sliding: Panel):
     before = sliding.image
     sliding.set("delta", 2.0)
@@ -325,6 +334,7 @@ def test_settings_outside_the_choices_are_refused_at_once(change: dict[str, Any]
 # ---------------------------------------------------------------------- proved or not
 
 
+@pytest.mark.few(0)
 def test_nothing_is_called_certified_before_the_check(panel: Panel):
     panel.set("T", 0.7)
     assert len(panel.images) == len(panel.texts) == 2
@@ -341,6 +351,7 @@ def test_what_the_check_rejects_is_not_certified(explorer: Explorer, monkeypatch
     assert view.grade == "doubt"
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("first", "second"),
     thinned(
@@ -408,7 +419,7 @@ def made(
     return make
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     "settings",
     thinned(
@@ -459,6 +470,7 @@ def test_a_graph_without_edges_stays_where_it_is():
 # ---------------------------------------------------------------------- with and without widgets
 
 
+@pytest.mark.few(0)
 def test_in_a_notebook_the_controls_come(monkeypatch: pytest.MonkeyPatch):
     import ipywidgets
 
@@ -470,6 +482,7 @@ def test_in_a_notebook_the_controls_come(monkeypatch: pytest.MonkeyPatch):
         explore(settings=Settings("fig7"))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("notebook", [True, False])
 def test_without_widgets_there_is_a_static_view(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], notebook: bool
@@ -485,6 +498,7 @@ def test_without_widgets_there_is_a_static_view(
     assert "\nverdict    certified" in repr(view)
 
 
+@pytest.mark.few(0)
 @pytest.mark.filterwarnings("error", "ignore::DeprecationWarning:matplotlib|pyparsing")
 @pytest.mark.parametrize("settings", [Settings("fig5a"), Settings("fig5a", kind="sliding-mode", seed=2)])
 def test_no_text_of_the_figure_is_clipped_or_on_another_panel(explorer: Explorer, settings: Settings):

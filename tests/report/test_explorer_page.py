@@ -180,6 +180,7 @@ def test_a_certificate_in_the_making_gives_way_to_a_control_that_is_moved():
             assert isinstance(waiting.exception(), Superseded)
 
 
+@pytest.mark.few(0)
 @pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="open files are told elsewhere there")
 def test_requests_open_fonts_once(server: ExplorerServer):
     """Every one of these has a thread of its own."""
@@ -249,6 +250,7 @@ def started(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
         process.communicate()
 
 
+@pytest.mark.few(0)
 @pytest.mark.skipif(os.name == "nt", reason="signals are sent otherwise there")
 def test_ctrl_c_ends_the_explorer_at_once_and_leaves_no_process():
     """``ptcc explore fig3a`` of the README; the port that is asked for is taken."""
@@ -285,7 +287,7 @@ main()
 """
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0)
 @pytest.mark.skipif(os.name == "nt", reason="signals are sent otherwise there")
 @pytest.mark.parametrize("again", range(4))
 def test_ctrl_c_ends_the_explorer_well_while_native_code_draws(again: int):

@@ -42,6 +42,7 @@ def test_a_number_stands_in_its_sentence_rounded_to_its_side(name: str):
         assert written & set(re.findall(r"-?[0-9][0-9.]*(?:e[-+]?[0-9]+)?", fact.text)), fact
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", NAMES)
 def test_the_short_screen_leaves_details_out_and_the_long_one_tells_every_fact(name: str):
     saved = ptcc.read_certificate(CORPUS / f"{name}.json")
@@ -100,6 +101,7 @@ def told(certificate: ptcc.Certificate, head: str) -> list[str]:
     return [fact.text for fact in certificate.facts() if fact.head == head]
 
 
+@pytest.mark.few(0)
 def test_what_is_told_of_other_agents_or_another_law_says_so(tmp_path: Path):
     led = [("lead", "a", 1), ("a", "b", 1), ("b", "a", -1)]
     law, asks = ptcc.NominalProtocol(), ptcc.Asks(simulation=False, method="paper")
@@ -125,6 +127,7 @@ def test_a_bound_of_initial_states_in_a_formation_is_told_of_positions():
         assert told(certificate, "protocol")[0].endswith("; all |x_k(0)| <= 2, in a formation")
 
 
+@pytest.mark.few(0)
 def test_agents_of_order_n_are_not_single_integrators_and_end_at_their_places(tmp_path: Path):
     path = [("a", "b", 1), ("b", "a", 1)]
     start, asks = ptcc.InitialState([1, 2], v0=[0, 1]), ptcc.Asks(simulation=False)

@@ -66,6 +66,7 @@ def words(page):
     return " ".join(re.sub("</?bdi>|(<[^>]*>)", lambda tag: " " if tag[1] else "", text).split())
 
 
+@pytest.mark.few(0)
 def test_the_first_screen_tells_family_signal_end_rate_bound_ratio_and_input(made, tmp_path):
     made.save(tmp_path / "c.json")
     assert write_report(tmp_path / "c.json", tmp_path / "c.html", day=date(2026, 1, 1)) == "certified"
@@ -84,6 +85,7 @@ def test_the_first_screen_tells_family_signal_end_rate_bound_ratio_and_input(mad
     assert "The bounds are kept" in words(page)
 
 
+@pytest.mark.few(0)
 def test_what_is_proved_of_restricted_signals_is_told_too():
     saved = read_certificate(certify(SWITCHING, PROTOCOL, signal=DwellTime("0.2", clock="t")).to_dict())
     told = "t least 0.2 of time between switches"
@@ -157,6 +159,7 @@ def test_a_page_of_an_undecided_family_says_what_to_try_and_claims_nothing(made,
         write_report(undecided, tmp_path / "u.tex")
 
 
+@pytest.mark.few(0)
 def test_a_statement_has_intervals_behaviour_rate_bound_and_input(made, tmp_path):
     family = Family.switching({"day": Family.from_graph(DAY, uncertainty="10%"), "night": NIGHT})
     certify(family, PROTOCOL, [3, 1, 2]).save(tmp_path / "c.json")
@@ -215,6 +218,7 @@ def test_a_statement_of_which_one_component_depends_on_the_signal_claims_the_oth
     assert "& no limit claimed" in text and "The theorem" not in text
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("clock", thinned(["s", "t"], 2))
 def test_under_a_dwell_time_the_page_shows_signals_that_keep_it(clock: str):
     promise = DwellTime("0.3", clock=clock)

@@ -33,6 +33,7 @@ def drawn():
     return certificate, sample_runs(certificate, [RandomSignal(1), RandomSignal(2), WorstCaseSignal()])
 
 
+@pytest.mark.few(0)
 def test_every_run_lies_within_what_is_shaded(drawn):
     certificate, runs = drawn
     ax = plot_trajectory(certificate, runs=runs)
@@ -110,6 +111,7 @@ def test_ranges_of_uncertain_weights_are_written_at_their_edges_and_edges_that_m
     assert {"uncertain weight", "may fail"} <= {text.get_text() for text in ax.get_legend().get_texts()}
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("n", [1, 2, 9, 50])
 def test_graphs_of_all_sizes_are_drawn(n):
     edges = [(k, (k + 1) % n, 0, 1 + k % 2) for k in range(n)] if n > 1 else []

@@ -49,7 +49,7 @@ def assert_fits(lines: list[str], most: int) -> None:
         assert cell_len(line) <= 80 and line.isprintable() and line == line.rstrip(), line
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_decision_of_any_family_fits_the_screen(kind: str):
     rng = random.Random(KINDS.index(kind))
@@ -66,7 +66,7 @@ def test_the_decision_of_any_family_fits_the_screen(kind: str):
             assert len(components) > 1 or sum(line.startswith("claim") for line in told) == 1
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_certificate_of_any_family_fits_the_screen(kind: str):
     rng = random.Random(10 + KINDS.index(kind))
@@ -82,6 +82,7 @@ def test_the_certificate_of_any_family_fits_the_screen(kind: str):
     assert certificate_lines(cert, "g.csv")[-1].startswith(f"verdict    {cert.assessment.text}")
 
 
+@pytest.mark.few(0)
 def test_where_more_is_claimed_of_some_signals_every_line_says_of_which_it_is():
     line = ptcc.SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -2)])
     pair = Family.switching([line, ptcc.SignedDigraph.from_edges([("b", "a", 1), ("a", "c", -1)])])
@@ -97,6 +98,7 @@ def test_where_more_is_claimed_of_some_signals_every_line_says_of_which_it_is():
             assert {told in line for line in marked} == {signal != "any"}
 
 
+@pytest.mark.few(0)
 def test_the_gain_that_is_proposed_makes_the_bound_useful_and_bounds_the_input():
     edges = [("a", "b", 1), ("b", "c", -2)], [("b", "a", 1), ("a", "c", -1)]
     pair = Family.switching([ptcc.SignedDigraph.from_edges(some) for some in edges])
@@ -178,6 +180,7 @@ def told(lines: list[str], head: str) -> str:
     return next(line[11:] for line in text.splitlines() if line.startswith(head))
 
 
+@pytest.mark.few(0)
 def test_many_agents_that_keep_their_value_and_many_intervals_are_counted_and_nothing_is_cut():
     family = many_followers(40)
     x0 = {label: k % 7 - k for k, label in enumerate(family.labels)}
@@ -222,6 +225,7 @@ def assert_once(component: FamilyComponent, text: str) -> None:
     assert set(words) == set(component.family.labels) or "in all" in text, text
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("sigma0", "mu3"), thinned([([1, "-1/2", 0], "0.1"), (None, "0.1"), ([1, "-1/2", 0], 1), (None, 1)], 2)
 )

@@ -153,7 +153,7 @@ def peak_of(ax: Axes) -> Annotation | None:
     return next((text for text in ax.texts if text.get_text().startswith("certified peak")), None)  # type: ignore[return-value]
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", ["fig1a", "fig3b", "apart", "single"])
 def test_each_of_few_agents_has_a_line_of_its_camp_and_its_name(name: str) -> None:
     cert = certified(name)
@@ -194,6 +194,7 @@ def test_of_many_agents_the_parts_are_drawn_and_few_agents_named() -> None:
         assert len(agent_lines(ax)) <= 2 * len(set(group)) and 2 <= len(ax.texts) <= 9
 
 
+@pytest.mark.few(0)
 @pytest.mark.usefixtures("every_class")
 def test_the_peak_is_drawn_where_it_holds_only() -> None:
     graph, start = graph_of("fig3b"), [-4, 3, -1, 2, -2, 5]
@@ -221,6 +222,7 @@ def test_the_peak_is_drawn_where_it_holds_only() -> None:
         assert steps == {"steps-post" if run.held_input is not None else "default"}
 
 
+@pytest.mark.few(1)
 @pytest.mark.usefixtures("every_class")
 @pytest.mark.parametrize("radius", [5, 1])
 def test_beside_the_peak_of_a_set_the_set_is_named(radius: int) -> None:
@@ -233,6 +235,7 @@ def test_beside_the_peak_of_a_set_the_set_is_named(radius: int) -> None:
     assert ("not from where this run begins" in text.get_text()) == (radius < 5)
 
 
+@pytest.mark.few(0)
 def test_of_a_certificate_under_limits_the_run_under_them_is_drawn_and_they_are_named() -> None:
     graph, start = graph_of("fig3b"), [-4, 3, -1, 2, -2, 5]
     held, capped = GainLimits(sample_period="0.01"), GainLimits(gain_cap="0.5")
@@ -251,6 +254,7 @@ def test_of_a_certificate_under_limits_the_run_under_them_is_drawn_and_they_are_
     assert titles == {"held": "held over 0.01", "capped": "gain at most 0.5", "both": "without the limits of the gain"}
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("limits", [None, GainLimits(gain_cap="0.5")], ids=["ideal", "capped"])
 def test_figures_of_a_formation_show_positions(limits: GainLimits | None) -> None:
     """Lines of states begin at ``x0`` and end at final positions; no word tells them less places."""
@@ -272,6 +276,7 @@ def test_figures_of_a_formation_show_positions(limits: GainLimits | None) -> Non
 CAPPED = ptcc_certify.LateMessages(delay="0.01", gain_cap=40)
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("agents", "x0"),
     [
@@ -322,6 +327,7 @@ def test_an_input_without_bound_is_drawn_with_its_start() -> None:
     assert ax.get_yscale() == "log" and peak_of(ax) is None
 
 
+@pytest.mark.few(0)
 def test_the_input_of_the_sliding_mode() -> None:
     example = EXAMPLES[5]
     start, sigma0 = (list(map(float, text.split(","))) for text in (example.x0, example.sigma0 or ""))
@@ -375,6 +381,7 @@ def nodes_in(ax: Axes) -> dict[tuple[float, float], Line2D]:
     return {(x, y): line for line in marks for x, y in line.get_xydata()}  # type: ignore[misc]
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", NAMES)
 def test_graphs_have_a_node_for_every_agent_and_an_arrow_for_every_edge(name: str) -> None:
     structure = analyse(graph_of(name))
@@ -399,6 +406,7 @@ def test_graphs_have_a_node_for_every_agent_and_an_arrow_for_every_edge(name: st
     assert not {colour for colour, _, _ in EDGE_STYLES.values()} & {colour for colour, _ in CAMP_STYLES.values()}
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", thinned(["fig5b", "fig1a", "fig1b", "fig3a", "ring", "fig3b", "fig5a", "apart"]))
 def test_every_arrow_keeps_away_from_nodes_that_are_not_its_ends(name: str) -> None:
     graph = ring(LABELLED_NODES) if name == "ring" else graph_of(name)
@@ -522,6 +530,7 @@ def test_short_labels_of_40_agents_stand_in_their_nodes() -> None:
         assert abs((box.x0 + box.x1) / 2 - place[0]) < 1 and box.width * 72 / ax.figure.dpi < 12.6
 
 
+@pytest.mark.few(0)
 def test_the_axis_of_an_input_that_is_large_for_a_short_time_alone_is_logarithmic() -> None:
     for name, scale in (("fig1a", "log"), ("fig3a", "linear")):
         example, _, _ = select(name)[name == "fig1a"]
@@ -567,7 +576,7 @@ ASKED: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("title", ASKED)
 def test_the_run_that_is_drawn_is_the_one_that_was_asked(title: str) -> None:
     graph = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1), (1, 4, 1), (3, 4, -1)])
@@ -596,6 +605,7 @@ def test_where_delays_are_too_short_for_a_run_the_states_say_that_they_are_witho
 # ---------------------------------------------------------------------- spectra and frontiers
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", NAMES)
 def test_spectra_with_the_line_of_a_bounded_input(name: str) -> None:
     cert = certified(name)
@@ -626,6 +636,7 @@ def test_spectra_without_a_line() -> None:
         assert ax.get_xlabel() == "real part of eigenvalue" and ax.get_ylabel() == "imaginary part of eigenvalue"
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", NAMES[:-1])
 def test_frontiers_hold_every_proved_function(name: str) -> None:
     cert = certified(name)
@@ -666,6 +677,7 @@ def test_figures_are_drawn_into_given_axes() -> None:
 # ---------------------------------------------------------------------- decay, runs, style
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("axis", ["left", "time", "clock"])
 def test_the_decay_lies_under_the_bound_and_the_bound_is_the_best_of_all(axis: str) -> None:
     cert = certified("fig3b")
@@ -692,6 +704,7 @@ def test_the_decay_lies_under_the_bound_and_the_bound_is_the_best_of_all(axis: s
             assert y == pytest.approx(y[0] * np.exp(-function.rate_below * place / 2), rel=1e-9)
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", ["fig1a", "fig3a", "fig5b", "apart"])
 def test_no_run_is_drawn_above_a_bound(name: str) -> None:
     cert = certified(name)
@@ -732,6 +745,7 @@ def test_the_decay_needs_a_proved_bound_and_a_known_axis() -> None:
         )
 
 
+@pytest.mark.few(0)
 def test_of_a_certificate_without_a_run_the_bounds_are_drawn_and_states_simulated(tmp_path: Path) -> None:
     cert = certified("fig3b")
     cert.save(tmp_path / "c.json")
@@ -783,6 +797,7 @@ def gallery() -> dict[str, Figure]:
     return figures
 
 
+@pytest.mark.few(0)
 def test_no_text_of_a_figure_overlaps_another_or_leaves_the_figure_or_is_small() -> None:
     for name, figure in gallery().items():
         texts = {text for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip()}
@@ -890,6 +905,7 @@ def test_figures_without_axes_have_the_style_and_a_column_of_width(tmp_path: Pat
     assert own.xaxis.label.get_size() == plt.rcParams["font.size"]
 
 
+@pytest.mark.few(0)
 def test_saved_figures_appear_whole_and_are_vectors_where_asked(tmp_path: Path) -> None:
     ax = plot_graph(analyse(graph_of("fig1b")))
     for name, head in (("a.png", b"\x89PNG"), ("a.pdf", b"%PDF"), ("a.svg", b"<?xml"), ("B.SVG", b"<?xml")):
@@ -902,6 +918,7 @@ def test_saved_figures_appear_whole_and_are_vectors_where_asked(tmp_path: Path) 
     assert int.from_bytes((tmp_path / "a.png").read_bytes()[16:20]) == 300
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", NAMES)
 def test_the_energy_grows_and_stays_under_its_bound(name: str) -> None:
     cert = certified(name)
@@ -965,6 +982,7 @@ def test_no_certified_line_for_a_run_from_elsewhere() -> None:
         plot_input(simulate(pair, PROTOCOL, [1e13, 1e13 + 8]), certificate=near)
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("size", thinned(["1e-250", "1e13", "1e155", "1e250"], 3))
 def test_starts_of_any_size_are_drawn(size: str) -> None:
     pair = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
@@ -1007,6 +1025,7 @@ def test_ticks_of_time_do_not_overlap_beside_long_names():
     assert len(boxes) > 1 and all(a.x1 < b.x0 for a, b in pairwise(boxes))
 
 
+@pytest.mark.few(0)
 def test_names_of_agents_that_end_at_one_place_do_not_cover_each_other():
     pair = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
@@ -1021,6 +1040,7 @@ def test_names_of_agents_that_end_at_one_place_do_not_cover_each_other():
     assert np.hypot(*(first - second)) > NAME_SIZE
 
 
+@pytest.mark.few(0)
 def test_coordinates_of_agents_stand_below_each_other_and_side_by_side_in_a_wide_figure():
     pair = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
@@ -1041,6 +1061,7 @@ def test_coordinates_of_agents_stand_below_each_other_and_side_by_side_in_a_wide
             assert ax.spines["bottom"].get_bounds()[0] == 0
 
 
+@pytest.mark.few(0)
 def test_a_motion_names_its_agents_and_all_panels_have_the_same_times():
     pair = SignedDigraph.from_edges([("ann", "bob", 1), ("bob", "ann", 1)])
     agents, x0 = ptcc_certify.Agents(order=2), {"ann": [0, 1], "bob": [3, 1]}
@@ -1051,6 +1072,7 @@ def test_a_motion_names_its_agents_and_all_panels_have_the_same_times():
     assert "deadline $T$" in {text.get_text() for text in panels[0].get_legend().get_texts()}
 
 
+@pytest.mark.few(0)
 def test_where_sliding_variables_are_0_neither_they_nor_their_deadline_are_announced() -> None:
     graph, x0 = SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1)]), [1, 2]
     p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
@@ -1063,7 +1085,7 @@ def test_where_sliding_variables_are_0_neither_they_nor_their_deadline_are_annou
         assert ("sliding variables over time" in trajectory_html(cert.trajectory)) == moves
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     "ends", [(1, 1 + 2**-50, 1), (0, 0, 0), (1e-320, 2e-320, 0), (-1e300, 1e300, 3), (1e300, 1e300, 1e300)]
 )
@@ -1076,6 +1098,7 @@ def test_bars_of_final_states_that_agree_but_for_last_digits_are_drawn(ends: tup
     assert all(low <= x <= high for x in ends)
 
 
+@pytest.mark.few(0)
 def test_states_of_very_different_sizes_are_those_of_the_certificate(tmp_path: Path) -> None:
     """A run that is integrated less its targets begins at small states but for the rounding of large ones."""
     graph = SignedDigraph.from_edges([("a1", "a2", "11/50")], nodes=[f"a{k}" for k in range(6)])

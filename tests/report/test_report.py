@@ -192,6 +192,7 @@ def page_without_run(name: str) -> str:
 # ---------------------------------------------------------------------- the page
 
 
+@pytest.mark.few(0)
 def test_the_commands_of_a_page_work(tmp_path: Path):
     """As they stand, in the folder of the certificate; with the graph added to the first."""
     (tmp_path / "g.csv").write_text("a,b,1\nb,a,-2\nb,c,1\n")
@@ -210,7 +211,7 @@ def test_the_commands_of_a_page_work(tmp_path: Path):
         assert done.returncode == 0, done
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     "name",
     [
@@ -242,6 +243,7 @@ def test_every_page_is_sound_and_says_what_it_is(name: str, tmp_path: Path):
     assert ("figure-sliding" in figures) == (name == "sliding")
 
 
+@pytest.mark.few(0)
 def test_numbers_are_rounded_to_the_safe_side():
     for name in ("nominal", "sliding"):
         made, source = example(name), page_without_run(name)
@@ -268,6 +270,7 @@ def test_numbers_are_rounded_to_the_safe_side():
             assert float(made.deviation_bound([q]).max()) <= float(deviation)
 
 
+@pytest.mark.few(0)
 def test_final_states_are_the_proved_ones(tmp_path: Path):
     made = example("nominal")
     assert made.final_state is not None
@@ -312,6 +315,7 @@ def test_reaching_times_are_no_earlier_than_proved():
     assert "whatever the disturbances within \u03b4" in Page(source).text
 
 
+@pytest.mark.few(0)
 def test_a_page_is_the_same_every_time_on_the_same_day(tmp_path: Path):
     made, day = example("nominal"), date(2026, 1, 2)
     assert reported(made, tmp_path, day=day) == reported(made, tmp_path, day=day)
@@ -329,6 +333,7 @@ def test_without_a_run_the_page_says_why(tmp_path: Path):
     assert "the certificate names no initial state" in page.text
 
 
+@pytest.mark.few(0)
 def test_what_a_certificate_does_not_say_is_said():
     def caveats(name: str) -> str:
         source = page_without_run(name)
@@ -364,6 +369,7 @@ def test_the_page_of_a_design_says_what_was_asked_and_of_which_states_its_bounds
     assert "met:" not in text
 
 
+@pytest.mark.few(0)
 def test_hostile_texts_are_shown_as_texts(tmp_path: Path):
     ring = [(HOSTILE[i], HOSTILE[(i + 1) % len(HOSTILE)], (-1) ** i) for i in range(len(HOSTILE))]
     certify(SignedDigraph.from_edges(ring), SLIDING, list(range(len(HOSTILE))), asks=Asks(simulation=False)).save(
@@ -459,6 +465,7 @@ def test_isolated_agents_under_the_sliding_mode_keep_the_difference(tmp_path: Pa
     assert [row[4] for row in rows((tmp_path / "c.html").read_text(), "Where the agents end")] == ["-2", "2"]
 
 
+@pytest.mark.few(0)
 @pytest.mark.usefixtures("framed_figures")
 def test_the_heading_names_the_sharpest_claim(tmp_path: Path):
     allies = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("b", "c", 1)])
@@ -689,6 +696,7 @@ def test_a_statement_whose_figure_has_no_place_writes_nothing(tmp_path: Path):
     assert {path.name for path in tmp_path.iterdir()} == {"c.json", "s_decay.pdf"}
 
 
+@pytest.mark.few(0)
 def test_the_file_does_not_say_who_checked_it(tmp_path: Path):
     example("nominal").save(tmp_path / "c.json")
     path = forged(tmp_path, producer="Theorem. Everything is proved")
@@ -733,6 +741,7 @@ def test_a_statement_holds_hypotheses_claim_and_numbers(tmp_path: Path):
     )
 
 
+@pytest.mark.few(0)
 @pytest.mark.usefixtures("framed_figures")
 @pytest.mark.parametrize("sigma0", [None, [1, 0, -2, 1, 0, 3]], ids=["nominal", "sliding"])
 def test_a_statement_of_a_formation_is_that_of_states_less_places_but_for_where_agents_are(sigma0: Any):
@@ -775,6 +784,7 @@ def test_through_a_reaching_phase_the_statement_tells_what_is_left_from_T_r_on(t
         assert least * 0.999 <= share <= least * 1.12
 
 
+@pytest.mark.few(0)
 @pytest.mark.usefixtures("framed_figures")
 def test_the_bound_through_a_reaching_phase_is_called_numerical_everywhere(tmp_path: Path):
     for name, word, arithmetic in (
@@ -819,6 +829,7 @@ def test_the_page_says_in_words_why_a_bound_says_little(tmp_path: Path):
     assert "--rho2" not in page
 
 
+@pytest.mark.few(1)
 @pytest.mark.usefixtures("framed_figures")
 @pytest.mark.parametrize("more", [{}, {"sample_period": "0.1"}])
 def test_bounds_without_the_limits_of_the_gain_are_told_so(more: dict[str, Any], tmp_path: Path):

@@ -64,7 +64,7 @@ def assert_screen(certificate: ptcc.Certificate, name: str = "graph") -> list[st
     return lines
 
 
-@pytest.mark.few(5)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("kind", thinned(KINDS))
 def test_of_every_class_the_screens_fit_8_lines_of_80_columns(kind: str):
     kwargs = dict(all_classes())[kind]
@@ -135,6 +135,7 @@ REQUESTS: list[tuple[Any, dict[str, Any], int, str]] = [
 ]
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("protocol", "request_", "code", "says"), REQUESTS, ids=str)
 def test_whatever_is_asked_the_screen_is_short_and_agrees_with_the_exit_code(protocol, request_, code, says):
     certificate = certify_words(PAIR, protocol, [5, 1], simulation=False, **request_)
@@ -178,6 +179,7 @@ def test_a_drawn_state_is_not_told_where_a_set_is_asked_about():
         assert "x(T)" not in text and "every agent" not in text and "all |x_k(0)| <= 1" in text
 
 
+@pytest.mark.few(0)
 def test_final_states_are_exact_or_called_rounded_and_of_many_there_are_the_ends():
     def line(x0: list[Any], graph: SignedDigraph = PAIR) -> str:
         lines = assert_screen(ptcc.certify(graph, NOMINAL, x0, asks=ptcc.Asks(simulation=False, method="paper")))
@@ -245,6 +247,7 @@ def test_a_header_that_swaps_the_columns_is_told(tmp_path):
         assert short_screen(structure_facts(structure, "g"))[1] == f"read       columns by header: {says}"
 
 
+@pytest.mark.few(0)
 def test_of_many_components_the_largest_four_are_told():
     edges = [(f"{k}a{i}", f"{k}a{i + 1}", 1) for k in range(6) for i in range(k)]
     lines = assert_screen(

@@ -216,6 +216,7 @@ def brute_force(rows, x, until, h, cap, stop, p):
     return course, x
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("cap", "stop", "h"),
     thinned(product([None, "0.05", "0.3", 5, 1000], [None, "0.13"], ["0.07", "0.2", "0.05", "0.59", "0.9"]), 7),
@@ -416,6 +417,7 @@ def test_the_deadline_is_reached_continuously_under_a_disturbance():
     assert np.abs(fine.states[:, 0] - run.final_state).max() < 1e-9
 
 
+@pytest.mark.few(0)
 def test_a_large_disturbed_graph_and_its_columns():
     rng = np.random.default_rng(5)
     graph, start = random_graph(rng, 250), rng.normal(size=(250, 2))

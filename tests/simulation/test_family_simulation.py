@@ -53,7 +53,7 @@ def signals(family):
     ]
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("family", thinned(families(), 2), ids=lambda family: f"{family.n_nodes} nodes")
 def test_a_run_is_a_product_of_exponentials_of_its_members(family):
     members, x0 = Members(family), np.random.default_rng(0).normal(size=family.n_nodes)
@@ -207,6 +207,7 @@ def test_a_signal_that_switches_too_often_is_refused_in_time(monkeypatch):
         simulate(PAIR, PROTOCOL, [1, 2, 3], RandomSignal(dwell=1e-3))
 
 
+@pytest.mark.few(0)
 def test_where_no_limit_exists_a_run_does_not_claim_to_have_settled():
     plus = SignedDigraph.from_edges([("a", "c", 1)], nodes="abc")
     minus = SignedDigraph.from_edges([("b", "c", 1)], nodes="abc")

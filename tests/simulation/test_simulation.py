@@ -80,6 +80,7 @@ def test_the_state_is_the_matrix_exponential_of_the_clock(name, protocol):
     assert spread(run.final_state, exact(graph, 1e4, start)[:, 0]) < 1e-9
 
 
+@pytest.mark.few(0)
 @settings(deadline=None, max_examples=25)
 @given(st.integers(2, 12), st.integers(0, 2**32), st.sampled_from([0, 6]), st.floats(0.2, 2))
 def test_accuracy_on_random_graphs_with_weights_up_to_six_decades_apart(n, seed, decades, T):
@@ -90,6 +91,7 @@ def test_accuracy_on_random_graphs_with_weights_up_to_six_decades_apart(n, seed,
         assert spread(run.states[:, i], exact(graph, run.clock[i], start)[:, 0]) < 3e-9 * np.abs(start).max()
 
 
+@pytest.mark.few(0)
 @settings(deadline=None, max_examples=25)
 @given(st.integers(2, 8), st.integers(0, 2**32), st.sampled_from([0, 4]))
 def test_a_deadline_called_settled_is_the_limit(n, seed, decades):
@@ -111,6 +113,7 @@ def sparse_graph(rng, n, decades, links=4):
     return SignedDigraph.from_matrix(W, orientation="listens")
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("n", "decades"), [(500, 0), (500, 3), (10_000, 0)])
 def test_a_large_graph_is_solved_by_gmres_as_accurately(n, decades):
     rng = np.random.default_rng(n)
@@ -152,6 +155,7 @@ def alarm_interrupts():
     gc.callbacks.extend(callbacks)
 
 
+@pytest.mark.few(1)
 @pytest.mark.skipif(os.name == "nt", reason="no alarms")
 @pytest.mark.usefixtures("alarm_interrupts")
 @pytest.mark.parametrize(

@@ -180,6 +180,7 @@ def check_campaign(title, rows, finest, extrapolated):
             assert all(0.9 < order < 1.1 for order in own), (name, kind)
 
 
+@pytest.mark.few(0)
 def test_implicit_euler_on_the_inclusion_approaches_our_solution_at_order_one():
     rows = campaign(len(KINDS), [500, 1000, 2000], np.random.default_rng(11))
     check_campaign("implicit Euler", rows, finest=5e-3, extrapolated=2e-5)
@@ -223,6 +224,7 @@ def between_events(graph, p, x0, sigma0, d, events, z_wanted):
     return out, left_over, state[:n]
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("kind", "power"), thinned(product(["sine", "worst-case", "state", "constant"], [F(1), F(3, 2), F(3)]))
 )
@@ -257,6 +259,7 @@ def test_an_explicit_integration_between_the_reaching_times_agrees(kind, power):
 # ---------------------------------------------------------------------- the outcome
 
 
+@pytest.mark.few(0)
 def test_ten_disturbances_end_in_the_same_exact_final_state():
     graph, p = six(), protocol()
     levels = np.linspace(-1, 1, 25)
@@ -423,6 +426,7 @@ def test_sliding_variables_keep_their_sign_until_they_are_exactly_zero_for_good(
     assert (np.abs(run.sliding.disturbance) <= 1).all()
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("d", ["worst-case", "sin(9*k*t)", lambda t, x, sigma: np.sin(x)])
 def test_the_inputs_are_those_of_the_protocols_expression_and_the_equivalent_control(d):
     graph, p = six(), protocol()
@@ -531,6 +535,7 @@ def test_runs_may_start_after_either_deadline():
     np.testing.assert_allclose(simulate(six(), p, X0, sigma0=SIGMA0, times=[4]).states[:, 0], expected, atol=1e-9)
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     "d", ["worst-case", "sin(9*k*t)", telegraph_noise(1, 10, 6, 3.0), lambda t, x, sigma: np.sin(x)]
 )
@@ -550,6 +555,7 @@ def test_the_solution_does_not_depend_on_where_it_is_sampled(d):
     assert other.at(0.5) == pytest.approx(dense.at(0.5), abs=1e-8)
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("unit", [1e8, 1e-8, -1.0, 1e100, 1e-100])
 def test_the_units_of_the_states_scale_the_solution(unit):
     size = abs(F(unit))

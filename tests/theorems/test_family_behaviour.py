@@ -82,6 +82,7 @@ def test_families_do_what_they_were_built_to_do():
             assert [c.behaviour for c in components] == [made.behaviour]
 
 
+@pytest.mark.few(0)
 def test_the_decision_agrees_with_kernels_of_members_and_with_slowest_products():
     for rng, component in small_components(24):
         assert agrees_with_members(rng, component, products=True)
@@ -102,6 +103,7 @@ def test_the_decision_agrees_on_many_families():
             assert all(replays(component) for component in decide(made.family, signal))
 
 
+@pytest.mark.few(0)
 def test_a_family_of_one_graph_does_what_the_graph_does():
     for _, made in families(24, 3000):
         graph = made.family.modes[0].mandatory
@@ -208,6 +210,7 @@ def constant_agrees(rng: random.Random, component: FamilyComponent) -> bool:
     return component.behaviour == max(behaviours, key=CHAIN.index)
 
 
+@pytest.mark.few(0)
 def test_constant_signals_do_what_every_member_does():
     for rng, component in small_components(18, 500, "constant"):
         assert constant_agrees(rng, component)
@@ -316,6 +319,7 @@ def agreeing_sets(component: FamilyComponent) -> set[frozenset[int]]:
     return {one for one in found if not any(one < other for other in found)}
 
 
+@pytest.mark.few(0)
 def test_no_larger_set_agrees_by_the_theorem():
     for _, component in small_components(12, 1200):
         groups = FamilyGroups(component)
@@ -350,6 +354,7 @@ def rate_holds(rng: random.Random, component: FamilyComponent) -> bool:
     return left <= float(rate.contraction) + 1e-12 and rate.factor(rate.window * 3) == rate.contraction**3
 
 
+@pytest.mark.few(0)
 def test_no_product_of_exponentials_leaves_more_than_the_explicit_rate():
     for rng, component in small_components(48, 4000):
         assert rate_holds(rng, component)

@@ -66,6 +66,7 @@ def test_lemma_2_unbalanced_strong_graphs_have_no_zero_eigenvalue(made: Made):
     assert np.sort(spectrum.nonzero.real) == pytest.approx(np.sort(np.linalg.eigvals(laplacian(made.graph)).real))
 
 
+@pytest.mark.few(0)
 @given(made_graphs(only=STRONG_BALANCED))
 def test_lemma_2_balanced_strong_graphs_have_a_simple_zero(made: Made):
     spectrum = laplacian_spectrum(analyse(made.graph))
@@ -87,6 +88,7 @@ def test_the_spectrum_has_one_zero_for_each_balanced_closed_component(made: Made
     assert spectrum.nonzero.real.sum() == pytest.approx(np.trace(laplacian(made.graph)), abs=1e-8)
 
 
+@pytest.mark.few(0)
 @given(made_graphs(only=("1.1", "1.2")))
 def test_lemma_2_3_the_positive_left_vector(made: Made):
     exact, p = exact_left_vector(made.graph), left_vector(made.graph)
@@ -126,6 +128,7 @@ def test_lemma_3_1_connectivity_bounds_the_form_from_below(made: Made, seed: int
     assert ((xi * (Lbar @ xi)).sum(0) >= a * (xi * (P @ xi)).sum(0) - 1e-9 * scale * (xi**2).sum(0)).all()
 
 
+@pytest.mark.few(0)
 @settings(max_examples=20)
 @given(made_graphs(only=STRONG_UNBALANCED, max_nodes=8))
 def test_lemma_3_2_unbalanced_strong_graphs_have_a_diagonal_lyapunov_matrix(made: Made):
@@ -146,6 +149,7 @@ def test_lemma_3_names_the_hypothesis_that_fails():
         algebraic_connectivity(unbalanced)
 
 
+@pytest.mark.few(0)
 @settings(max_examples=20)
 @given(made_graphs(only=("2.", "3."), max_nodes=10))
 def test_lemmas_7_and_9_1_the_follower_block(made: Made):

@@ -76,6 +76,7 @@ def rate_from_the_definition(structure: Structure, V: LyapunovFunction, theorem:
     return smallest(form) / w.max()
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("name", "kwargs"), class_cases())
 def test_every_row(name: str, kwargs: dict):
     """The row applies, its rate is the paper's to 1e-8, it is proved, and never above the spectral rate."""
@@ -154,6 +155,7 @@ def optimum_of_another_solver(structure: Structure, V: LyapunovFunction, theorem
     return float(t.value) * unit
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", ["1.2", "2.1 K=1", "2.1 K>=2", "2.2", "3.1 all single", "3.1 mixed no single", "3.2"])
 @pytest.mark.parametrize("seed", range(2))
 def test_the_objective_of_a_row_is_the_optimum_of_another_solver(name: str, seed: int):
@@ -167,6 +169,7 @@ def test_the_objective_of_a_row_is_the_optimum_of_another_solver(name: str, seed
     )
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("theorem", ["2.1", "2.2", "3.1 no single", "3.1 mixed", "3.2"])
 @pytest.mark.parametrize("seed", range(3))
 def test_the_chosen_rho_beats_a_thousand_others(theorem: str, seed: int):
@@ -200,7 +203,7 @@ def test_a_rho_next_to_the_end_of_its_interval_lies_within_what_is_proved(gap: f
     assert interval is not None and interval.exact is not None and near.rho <= interval.exact < 1
 
 
-@pytest.mark.few(15)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("name", "kwargs"), class_cases())
 def test_the_derivative_is_the_form_of_the_proof(name: str, kwargs: dict):
     """V' by CasADi equals -gain z'(Omega A + A'Omega)z to 1e-10 and is at most the form that gives the rate."""
