@@ -179,6 +179,7 @@ def test_classes_take_turns():
             ensemble.graph(i)
 
 
+@pytest.mark.few(0)
 def test_written_graphs_are_those_of_the_ensemble():
     assert ptcc("batch", "spec.toml", "--write-graphs", "made").code == 0
     ensemble = Ensemble.read("spec.toml")
@@ -405,6 +406,7 @@ class Deadly(SignedDigraph):
         return os._exit, (1,)
 
 
+@pytest.mark.few(0)
 def test_a_process_that_dies_is_an_error_of_one_row():
     deadly = Deadly(TRIANGLE.labels, TRIANGLE.source, TRIANGLE.target, TRIANGLE._weights)
     graphs = [Ensemble.read("spec.toml").graph(i) for i in range(5)]

@@ -156,6 +156,7 @@ def test_delays_of_many_times_the_deadline_are_forgiven_where_few_listen_to_each
     assert found is not None and 0 < found[0].b < 0.02
 
 
+@pytest.mark.few(0)
 def test_deviations_on_the_way_are_bounded_of_leaders_too() -> None:
     messages = LateMessages("0.002", own_delay=True, gain_cap=CAP)
     cert = certify_words(TEAM, PROTOCOL, [3, 1, 2, -4, 5], messages=messages, simulation=False, at="0.5")

@@ -72,7 +72,7 @@ def largest_at_start(cert: Certificate) -> Fraction:
 # ---------------------------------------------------------------------- bounds
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("name", "kwargs"), thinned(all_classes()[::4], 3))
 def test_no_deviation_bound_exceeds_the_largest_deviation_at_the_start(name: str, kwargs: dict, tmp_path: Path):
     rng = np.random.default_rng(5)
@@ -121,6 +121,7 @@ def test_sliding_variables_move_no_agent_farther_than_they_are_large_together(di
         assert not cert.comparison.violated, name
 
 
+@pytest.mark.few(0)
 def test_the_vector_norm_of_deviations_is_bounded_by_their_largest_entry():
     cert = slow()
     assert cert.initial_state is not None
@@ -156,6 +157,7 @@ def test_the_packaged_graphs_keep_their_rates(monkeypatch: pytest.MonkeyPatch):
         assert (a.rate, a.overshoot) == (b.rate, b.overshoot)
 
 
+@pytest.mark.few(0)
 def test_real_graphs_are_bounded_within_five_times_the_motion_in_the_median(real_data: Path):
     """The largest deviation at half time from a random start: its bound over the exact one."""
     names = ("sampson_t4", "sampson_sanctions", "regulatory_007")

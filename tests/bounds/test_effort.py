@@ -304,7 +304,7 @@ def test_no_input_of_the_sliding_mode_is_above_its_bounds(name: str, power: Frac
 # ---------------------------------------------------------------------- the energy by Lyapunov equations
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     "name", thinned(["1.2", "1.1", "2.2", "3.1 mixed", "2.1 K>=2", "3.1 all single", "disconnected mixed"])
 )
@@ -331,7 +331,7 @@ def test_the_energy_is_infinite_up_to_half_the_threshold():
         assert cert.effort is not None and (cert.effort.energy is not None) == finite
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("slides", [False, True])
 def test_a_forged_integral_of_the_energy_is_rejected(slides: bool):
     graph = load_graph("fig3a")

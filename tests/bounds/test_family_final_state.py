@@ -146,6 +146,7 @@ def box_along_signals(seed: int) -> int:
     return 1
 
 
+@pytest.mark.few(0)
 def test_boxes_attract_followers_along_random_signals():
     assert sum(box_along_signals(seed) for seed in range(15)) > 8
 

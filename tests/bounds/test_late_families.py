@@ -210,6 +210,7 @@ def test_known_weights_in_one_mode_are_bounded_as_those_of_a_graph():
     assert wide.witness(Fraction(1)).b < plain.witness(Fraction(1)).b
 
 
+@pytest.mark.few(0)
 def test_what_no_gain_takes_away_is_less_than_every_gain_leaves():
     leaders, found = MovingLeaders(speed="0.5"), []
     for cap, rho2 in ((Fraction(1, 1000), 2), (5, 2), (20, 2), (500, 2), (None, 2), (None, 50)):

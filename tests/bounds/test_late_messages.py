@@ -211,6 +211,7 @@ def test_100_graphs_with_leaders_that_settle_keep_their_bounds(block: int) -> No
     assert max(_judge_settling(100 + 20 * block + k) for k in range(20)) <= 1 + ROUNDING
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("seed", thinned([11, 12], 2))
 def test_the_longest_delay_leaves_as_little_as_was_asked_and_a_longer_one_does_not(seed: int) -> None:
     rng, structure, protocol, x0, ends = _case(seed)
@@ -797,6 +798,7 @@ def _nothing(case: LateCase) -> LateBounds:
     return LateBounds(case, case.initial_state is None)
 
 
+@pytest.mark.few(0)
 def test_the_longest_delay_behind_leaders_that_move_is_certified() -> None:
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1)])
     protocol, leaders = NominalProtocol(T=1, rho1=1, rho2=5, kappa=1), MovingLeaders("1/2")

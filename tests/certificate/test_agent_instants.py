@@ -149,6 +149,7 @@ def test_forged_instants_are_rejected(change: Callable[[list[Any]], Any], reason
     assert not report.accepted and reason in (report.reason or "")
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("kind", ["at rest", "cascade"])
 def test_instants_that_are_not_told_are_not_proved(kind: str):
     document = {key: part for key, part in made("camps", kind).to_dict().items() if key != "instants"}

@@ -111,6 +111,7 @@ def worst_ratio(certificate: Certificate) -> float:
     return float(ratios.max(initial=0))
 
 
+@pytest.mark.few(0)
 def test_deviations_stay_within_their_bounds_on_every_kind_of_graph():
     for seed in (5, 12):
         certificate = certified(case_of(seed), ("paper", "best")[seed % 2])

@@ -154,6 +154,7 @@ MORE_KEYS = {
 }
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", GRAPHS)
 def test_every_key_of_the_schema_is_there(name: str):
     data = through_json(example(name))
@@ -921,6 +922,7 @@ def test_the_perron_vector_alone_is_tight_on_undirected_graphs(name: str, weight
         assert cert.search.functions
 
 
+@pytest.mark.few(0)
 def test_an_instant_of_interest_is_served():
     """With ``at`` the bound there is no larger than without; only instants of [0, T) will do."""
     graph = of_size("1.2")

@@ -153,6 +153,7 @@ def test_screen_page_and_statement_tell_the_ends_of_constant_weights():
     assert f"Where they end: {ends}." in re.sub("[$]", "", report_latex(saved))
 
 
+@pytest.mark.few(0)
 @pytest.mark.usefixtures("framed_figures")
 def test_where_modes_have_camps_of_their_own_each_ends_within_the_ends_of_all():
     modes = [[("a", "b", 1, 2), ("b", "a", 1, 1)], [("a", "b", -2, -1), ("b", "a", -1, -1)]]

@@ -26,7 +26,7 @@ def certified(name):
     return certify(FAMILIES[name], PROTOCOL)
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", thinned(FAMILIES, 2))
 def test_a_bound_is_read_back_as_it_was_proved(name):
     made = certified(name)

@@ -122,6 +122,7 @@ def test_forged_phases_are_rejected(path: tuple[Any, ...], change: Callable[[Any
     assert not report.accepted and reason in (report.reason or "")
 
 
+@pytest.mark.few(0)
 def test_phases_that_are_not_told_are_not_proved():
     document = {key: part for key, part in made("order 4").to_dict().items() if key != "phases"}
     report = check(resealed(document))

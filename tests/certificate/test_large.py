@@ -139,7 +139,7 @@ def random_sparse(n: int, seed: int) -> SignedDigraph:
     return SignedDigraph.from_edges([(j, i, w) for (j, i), w in edges.items()], nodes=range(n))
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("n", "slides"), [(500, False), (400, True), pytest.param(1000, False, marks=pytest.mark.campaign)]
 )
@@ -263,6 +263,7 @@ def test_forged_rates_of_large_groups_are_rejected(balanced: bool):
             rejected(changed(data, where, new), "final-state of graph")
 
 
+@pytest.mark.few(0)
 def test_a_leader_group_beyond_the_limit_is_undecided_with_a_note(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(dominance, "FILL_ROWS", 100)
     graph = strong_graph(125, False, 5)
@@ -428,7 +429,7 @@ SLOW = {
 IN_CAMPAIGNS = ("path", "ring", "ladder", "huge weights", "tiny weights")
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     "name",
     [pytest.param(name, marks=pytest.mark.campaign if name in IN_CAMPAIGNS else ()) for name in SLOW],

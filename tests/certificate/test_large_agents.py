@@ -172,7 +172,7 @@ def test_many_agents_end_where_floats_say_and_the_file_says_the_same(kind: str, 
     assert np.allclose(table["x_2(T)"], middles.reshape(graph.n_nodes, 2, -1)[:, 1, 0], rtol=1e-12)
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("size", ["1e290", "1e-300"])
 def test_numbers_of_any_size_are_enclosed(size: str):
     """Positions and velocities beyond what floats hold squared, and near the smallest floats."""
@@ -252,6 +252,7 @@ LONG = [
 ]
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("kind", [*LONG, "cascade"])
 def test_mutants_of_final_states_that_are_accepted_are_true(kind: str):
     data = document(kind, 13, 2)

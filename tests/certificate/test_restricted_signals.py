@@ -127,6 +127,7 @@ def excesses(runs: int, seed: int, more: bool = False) -> list[float]:
 SOME_AND_MORE = pytest.mark.parametrize("more", [False, pytest.param(True, marks=pytest.mark.campaign)])
 
 
+@pytest.mark.few(0)
 @SOME_AND_MORE
 def test_every_claim_is_verified(more: bool):
     for certificate in certificates(more):
@@ -217,6 +218,7 @@ def test_a_rate_for_restricted_signals_is_never_below_that_for_any(more: bool):
         assert certificate.rate is None or certificate.rate_of_signal >= certificate.rate
 
 
+@pytest.mark.few(0)
 def test_the_claims_are_read_back(tmp_path: Path):
     for certificate in certificates()[1:6:2]:
         certificate.save(tmp_path / "c.json")

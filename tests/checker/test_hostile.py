@@ -111,6 +111,7 @@ def test_two_thousand_hostile_files_stay_within_a_gigabyte_and_ten_seconds(
             print(f"\nseed {SEED}, {way}: {worst}")
 
 
+@pytest.mark.few(0)
 def test_colliding_keys_and_a_matrix_of_many_nodes_cost_the_verified_checker_little(
     worker: Callable[[str, Path], Json], tmp_path: Path
 ):

@@ -125,6 +125,7 @@ def test_figures_of_a_formation_take_limits_of_the_gain(what: str, tmp_path: Pat
     assert drawn.code == 0 and (tmp_path / "f.png").stat().st_size > 0, drawn.err
 
 
+@pytest.mark.few(0)
 def test_a_limit_of_the_input_that_is_exceeded_at_first_is_refuted():
     done = ptcc(*CERTIFY, "--agents", "double-integrator", "--max-input", "1")
     assert done.code == 3 and "refuted: |u_k| <= 1 (it is up to" in done.out and "at the start, proved" in done.out

@@ -134,7 +134,7 @@ def test_no_delay_is_told_that_the_check_does_not_accept(monkeypatch: pytest.Mon
     assert "older" not in ptcc("certify", *words).out
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -387,6 +387,7 @@ def test_messages_that_take_longer_than_the_deadline_are_certified_to_leave_what
     assert run.code == 0, run
 
 
+@pytest.mark.few(0)
 def test_screens_say_first_what_cannot_be_and_then_what_is_left() -> None:
     run = ptcc("certify", "chain.csv", "--delay", "0.02", "--x0", "1,0,2", *QUICK)
     heads = [line.split()[0] for line in run.out.splitlines() if not line.startswith(" ")]
@@ -576,6 +577,7 @@ def test_what_is_not_simulated_beside_late_messages_is_refused(words: tuple[str,
     assert run.code == 2 and said in run.err and run.err.count("\n") == 1, run
 
 
+@pytest.mark.few(0)
 def test_late_messages_and_leaders_that_move_from_certify_to_page() -> None:
     words = ("--delay", "0.02", "--leader-speed", "0.5", "--delta", "0.2", *START)
     run = ptcc("certify", "team.csv", *words, *PAPER, "--max-residual", "9", "-o", "both.json")
@@ -782,6 +784,7 @@ def test_a_rate_is_asked_of_the_loop_with_late_messages_moving_leaders_or_a_held
 VEHICLES = ("--agents", "double-integrator", "--exchange", "virtual", "--v0", "0,2,-1,3")
 
 
+@pytest.mark.few(0)
 def test_vehicles_that_exchange_virtual_positions_are_certified_checked_drawn_and_run():
     late = ("--delay", "0.01", "--leader-speed", "0.5", "--gain-cap", "20")
     said = ptcc("certify", "team.csv", *QUICK, *START, *VEHICLES, *late, "-o", "c.json")
@@ -823,6 +826,7 @@ def test_the_page_of_vehicles_that_hear_at_once_draws_them_with_leaders_that_mov
     assert "late messages: at most" not in page
 
 
+@pytest.mark.few(0)
 def test_the_largest_bound_that_is_drawn_is_that_of_the_nearest_proof_of_every_agent():
     Path("rate.csv").write_text("source,target,weight,delay\nann,bob,2,0.01\nbob,eve,-1,0.02\neve,bob,-3,0.01\n")
     asked = ("--delay", "delay", "--x0", "1,0,2", "--gain-cap", "40", "--no-simulation")

@@ -120,6 +120,7 @@ def test_a_file_that_is_no_certificate_is_unreadable(tmp_path: Path) -> None:
         assert subprocess.run([program(), file], capture_output=True, check=False).returncode == 2
 
 
+@pytest.mark.few(0)
 def test_the_input_is_spoken_of_iff_a_decay_was_proved(tmp_path: Path) -> None:
     program()
     for text in (paper_examples()[0], paper_examples()[6]):
@@ -612,6 +613,7 @@ def test_while_sliding_variables_move_what_the_input_takes_is_verified(
             assert check(mutant).accepted == right and (said(mutant, tmp_path).code == 0) == right, (key, label, share)
 
 
+@pytest.mark.few(0)
 @every(3)
 def test_while_sliding_variables_move_no_instant_before_they_rest_proves_a_bound(every: int, tmp_path: Path) -> None:
     program()
@@ -730,6 +732,7 @@ def test_efforts_of_other_sets_of_initial_states_are_named(tmp_path: Path) -> No
         assert code == 0 and named_ <= named(text)
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("every", [20, pytest.param(1, marks=pytest.mark.campaign)])
 def test_of_mutants_of_a_box_of_initial_states_none_is_accepted_unless_true_or_named(
     every: int, tmp_path: Path

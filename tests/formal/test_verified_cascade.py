@@ -168,6 +168,7 @@ def test_what_is_forged_is_rejected_by_both_checkers(name: str, tmp_path: Path) 
         assert check(weaker).accepted and said(weaker, tmp_path).code == 0
 
 
+@pytest.mark.few(0)
 def test_velocities_that_need_not_vanish_and_inputs_without_a_bound_are_rejected(tmp_path: Path) -> None:
     program()
     slow = made("velocities that need not vanish")

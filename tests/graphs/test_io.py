@@ -217,6 +217,7 @@ def test_undirected_edges_go_both_ways():
     }
 
 
+@pytest.mark.few(0)
 @given(
     st.lists(st.tuples(st.integers(0, 4), st.integers(0, 4), st.integers(-3, 3).filter(bool)), min_size=1),
     st.sampled_from(["sum", "last"]),
@@ -1333,6 +1334,7 @@ def test_links_are_followed_modes_kept_and_devices_written_to(tmp_path):
 # ---------------------------------------------------------------------------------------------- real graphs
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("name", "nodes", "edges_", "negative", "loops"),
     [
@@ -1380,6 +1382,7 @@ def test_small_real_graphs(real_data):
             assert read_graph(path).n_edges > 0
 
 
+@pytest.mark.few(0)
 def test_self_loops_of_epinions_are_refused_by_name(real_data):
     with pytest.raises(FormatError, match=r"line \d+: self-loop at node \d+ \(573 in all\)"):
         read_graph(real_data / "soc-sign-epinions.txt.gz", orientation="listens")

@@ -109,7 +109,7 @@ def test_a_state_at_rest_that_moves_elsewhere_has_no_quotient():
 # ---------------------------------------------------------------------- proved rates
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 def test_the_proved_rate_holds_exactly_at_every_member_drawn(certified):
     quotient, functions, _ = certified
     rng, n = np.random.default_rng(1), len(quotient.nodes)
@@ -123,6 +123,7 @@ def test_the_proved_rate_holds_exactly_at_every_member_drawn(certified):
             assert lmi.prove_positive_definite(S)
 
 
+@pytest.mark.few(0)
 def test_no_proved_rate_exceeds_the_proved_upper_bound_and_the_best_comes_near(certified):
     _, functions, bound = certified
     assert [V.rate for V in functions] == sorted((V.rate for V in functions), reverse=True)
@@ -252,6 +253,7 @@ def test_a_program_that_fails_leaves_those_of_smaller_rates(monkeypatch: pytest.
     assert len(search.functions) > 1 and search.functions[-1].overshoot < search.functions[0].overshoot / 2
 
 
+@pytest.mark.few(0)
 def test_consensus_of_more_agents_than_programs_take_has_a_rate_that_the_check_accepts():
     hub = [(0, k, Fraction(9, 10), Fraction(11, 10)) for k in range(1, 130)]
     rim = [(k, k + 1, Fraction(9, 10), Fraction(11, 10)) for k in range(1, 129)]

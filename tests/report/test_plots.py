@@ -815,6 +815,7 @@ def test_no_text_of_a_figure_overlaps_another_or_leaves_the_figure_or_is_small()
             assert width < 1 or height < 2, (name, text.get_text(), other.get_text())
 
 
+@pytest.mark.few(0)
 def test_names_of_any_script_lie_right_of_the_axis() -> None:
     for name in ("wide", "fig3b", "single"):
         for plot in (plot_trajectory, plot_input):

@@ -325,6 +325,7 @@ def test_a_page_is_the_same_every_time_on_the_same_day(tmp_path: Path):
     assert date.today().isoformat() in reported(made, tmp_path, simulation=False)
 
 
+@pytest.mark.few(0)
 def test_without_a_run_the_page_says_why(tmp_path: Path):
     page = sound(page_without_run("nominal"))
     assert "it was left out, as was asked" in page.text
@@ -349,6 +350,7 @@ def test_what_a_certificate_does_not_say_is_said():
     assert "article leaves disconnected graphs out" in caveats("disconnected")
 
 
+@pytest.mark.few(0)
 def test_the_page_of_capped_vehicles_does_not_say_that_their_gain_is_infinite():
     vehicles, messages = Agents(order=2, exchange="virtual"), LateMessages("0.01", gain_cap=20)
     graph = SignedDigraph.from_edges([("a", "b", 1)])
@@ -493,6 +495,7 @@ def test_numbers_beyond_floats_are_shown(tmp_path: Path):
     assert "beyond \u221210300" in page.text and "beyond the range of float64" in page.text
 
 
+@pytest.mark.few(0)
 def test_the_page_of_a_large_graph_stays_small(tmp_path: Path):
     n = 4_000
     graph = sparse_digraph(np.random.default_rng(2), n, 1.2)
@@ -606,6 +609,7 @@ def test_a_statement_fits_a_column_of_two(n: int, size: Any, sliding: bool, tmp_
     assert all(float(excess) <= 2 for excess in re.findall(r"Overfull \\hbox \(([0-9.]+)pt", log)), log
 
 
+@pytest.mark.few(0)
 @pytest.mark.usefixtures("framed_figures")
 @pytest.mark.parametrize("x0", thinned([[1, 2, 3], None], 2))
 def test_a_statement_tells_the_input_with_late_messages(x0: Any):
@@ -618,6 +622,7 @@ def test_a_statement_tells_the_input_with_late_messages(x0: Any):
     assert told + (", from within $1$ of it at first" if x0 is None else "") + "." in text
 
 
+@pytest.mark.few(0)
 @pytest.mark.usefixtures("framed_figures")
 def test_the_answer_of_late_messages_tells_whose_speed_it_names():
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)])
@@ -676,6 +681,7 @@ def test_starts_of_any_size_are_reported(size: str, tmp_path: Path):
     assert (tmp_path / "c_decay.pdf").exists() == (size != "0")
 
 
+@pytest.mark.few(1)
 @pytest.mark.usefixtures("framed_figures")
 @pytest.mark.parametrize("start", [["1", "1/3", "1/3"], ["1", "1/3", "0.33333333333333333333"]])
 def test_where_agents_begin_at_their_ends_or_all_but_there_a_page_has_no_decay(start: list[str]):
@@ -846,6 +852,7 @@ def test_bounds_without_the_limits_of_the_gain_are_told_so(more: dict[str, Any],
     assert ("gain \u2264 3: \u2016E\u2016" in page) != bool(more)
 
 
+@pytest.mark.few(0)
 def test_a_page_needs_neither_an_instant_after_the_reaching_time_nor_an_edge(tmp_path: Path):
     short = ptcc_certify.SlidingModeProtocol(T_r=1, T_s="1/100", rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
     certify("fig1b", short, InitialState([5, 1, 2, 3, 4, 6], sigma0="random"), asks=Asks(simulation=False)).save(

@@ -324,6 +324,7 @@ def test_certify_and_check_tell_the_same_of_single_agents(tmp_path):
     assert "agents within" in answers[0] and "the largest of agent" in answers[1]
 
 
+@pytest.mark.few(0)
 def test_instants_of_the_page_are_those_of_the_screen():
     certificate = ptcc.certify(
         PAIR, SLIDING, ptcc.InitialState([5, 1], sigma0=[1, 0]), asks=ptcc.Asks(simulation=False)
