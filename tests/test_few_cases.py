@@ -34,7 +34,7 @@ def test_quick(case):
 SLOW, OTHERS = [f"slow[{k}]" for k in range(6)], ["of_two[0]", "of_two[1]", "quick[0]", "quick[1]"]
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("options", "which", "left"),
     [

@@ -341,6 +341,7 @@ def test_a_hundred_calls_are_listed():
     assert len(CALLS) >= 100
 
 
+@pytest.mark.few(100)
 @pytest.mark.parametrize("call", CALLS)
 def test_a_natural_call_gives_a_result_or_one_line_that_names_the_mend(call, names, monkeypatch):
     monkeypatch.chdir(names["folder"])

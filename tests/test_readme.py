@@ -30,11 +30,13 @@ SESSIONS = [block for _, block in blocks(TEXT, "sh") if "ptcc " in block and "pi
 RUN_ELSEWHERE = {"ptcc examples all -o figures", "ptcc explore fig3a", "ptcc batch ensemble.toml -o table.csv"}
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("session", SESSIONS, ids=lambda text: text.splitlines()[0][:30])
 def test_commands_run(session: str, folder: Path):
     run_commands(session, folder, RUN_ELSEWHERE)
 
 
+@pytest.mark.few(0)
 def test_the_batch_runs(folder: Path):
     lines = next(session for session in SESSIONS if "ptcc batch" in session).splitlines()
     (spec,) = [line for line in lines if line.endswith("> ensemble.toml")]
@@ -48,6 +50,7 @@ def test_there_are_commands():
     assert shown == set(cli.commands)
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("code", [block for _, block in blocks(TEXT, "python")])
 def test_python_runs(code: str):
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)

@@ -451,6 +451,7 @@ def scale(cluster: Any, workers: int) -> None:
     assert len(cluster.scheduler.workers) == workers
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("processes", [False, pytest.param(True, marks=pytest.mark.campaign)])
 def test_rows_are_the_same_wherever_they_are_computed(processes: bool, monkeypatch: pytest.MonkeyPatch):
     """Workers of a scheduler are processes, which take long to start, or threads; rows of own processes are above."""

@@ -1031,6 +1031,7 @@ def test_an_final_state_too_long_to_write_is_enclosed_and_proved():
             enclosed(written, Fraction(exact))
 
 
+@pytest.mark.few(0)
 def test_the_upper_bound_is_near_the_slowest_mode_and_at_most_twice_the_mean_eigenvalue():
     """No certified rate exceeds it, nor does the spectral rate."""
     for name in GRAPHS:

@@ -203,6 +203,7 @@ def test_a_graph_that_floats_cannot_solve_is_undecided_and_accepted_as_such():
 LONG_FINAL_STATES = ("1.1", "2.1 K>=2", "2.1 K=1", "3.1 mixed", "3.1 all single", "disconnected 1.1 2.1")
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("name", "slides"), thinned(product(LONG_FINAL_STATES, (False, True)), 5))
 def test_an_final_state_too_long_to_write_is_enclosed(name: str, slides: bool, monkeypatch: pytest.MonkeyPatch):
     """Where exact numbers would be too long, balls are proved instead; here whatever is no decimal fraction."""

@@ -36,7 +36,7 @@ def scaled(text: str, factor: Fraction) -> str:
     return str(number(text) * factor)
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(("seed", "own"), CASES)
 def test_what_is_made_is_accepted_by_both_arithmetics_and_kept_to_by_motions(seed: int, own: bool):
     data = whole(seed, own)

@@ -574,6 +574,7 @@ def test_deadlines_of_their_own_on_a_cycle_or_before_anything_arrives_are_refuse
 # ---------------------------------------------------------------------- leaders in groups that settle
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("seed", "cap"), [(3, None), (4, 12)])
 def test_followers_behind_leaders_that_settle_are_accepted_and_no_motion_exceeds_it(seed: int, cap: Any):
     data = settling(seed, cap)

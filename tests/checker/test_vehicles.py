@@ -239,7 +239,7 @@ def test_vehicles_lag_behind_leaders_that_move_from_the_deadline_on_too():
     assert late.vehicles.position.max() >= lag - 0.01
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("delay", ["0.03", 0])
 @pytest.mark.parametrize("cap", [None, 30])
 def test_the_bound_that_is_drawn_is_above_the_vehicles(cap: int | None, delay: str | int):

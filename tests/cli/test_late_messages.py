@@ -353,6 +353,7 @@ def test_small_delays_of_a_leader_group_are_certified_under_a_cap_up_to_a_limit_
     assert "this certificate's limit is a delay of" in long.assessment.text
 
 
+@pytest.mark.few(0)
 def test_followers_of_a_leader_group_are_certified_without_a_cap_where_the_leaders_hear_each_other_at_once() -> None:
     Path("led.csv").write_text("source,target,weight,delay\np,q,1,0\nq,p,2,0\np,f,-1,0.01\nf,g,1,0.02\ng,f,0.5,0.02\n")
     words = ("certify", "led.csv", "--delay", "delay", "--rho2", "12", *START, *PAPER)
@@ -934,6 +935,7 @@ def test_a_sign_term_takes_up_how_leaders_move_where_messages_are_late_too() -> 
     assert ptcc("plot", "s.json", "-o", "s.svg").code == 0
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     "words",
     [

@@ -198,6 +198,7 @@ def test_what_cannot_be_read_or_told_takes_one_line_and_bounded_memory(tmp_path:
         assert run.returncode == 2 and run.stderr.count("\n") == 1 and "xception" not in run.stderr
 
 
+@pytest.mark.few(0)
 def test_claims_besides_those_of_the_graph_are_named_and_not_believed(tmp_path: Path) -> None:
     program()
     document = json.loads(paper_examples()[0])
@@ -529,6 +530,7 @@ def test_a_shorter_path_or_a_lower_energy_than_is_proved_is_rejected(tmp_path: P
             assert not check(mutant).accepted and said(mutant, tmp_path).code == 1, path
 
 
+@pytest.mark.few(0)
 def test_a_lower_peak_than_is_proved_is_rejected(tmp_path: Path) -> None:
     program()
     edges, start = [("a", "b", 1), ("b", "a", -1), ("b", "c", -2), ("c", "d", 1)], [1, 2, 3, -4]

@@ -275,6 +275,7 @@ def test_rows_are_verified_and_a_higher_rate_of_theirs_is_rejected(tmp_path: Pat
     assert code == 1 and "decays[0]" in text, text
 
 
+@pytest.mark.few(0)
 def test_without_functions_it_is_verified_that_components_come_to_rest(tmp_path: Path) -> None:
     program()
     seen = set()

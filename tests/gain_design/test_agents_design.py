@@ -95,7 +95,7 @@ def test_a_deadline_that_is_shorter_by_two_hundredths_is_not_proved_to_keep_the_
     assert not answer.asked.met_by(fresh(answer, answer.deadline * Fraction(98, 100), X0, CASES[name][3].get("v0")))
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize("name", CASES)
 def test_a_run_keeps_the_limit(name: str):
     answer = designed(name)

@@ -6,6 +6,7 @@ from fractions import Fraction
 
 import flint
 import numpy as np
+import pytest
 from exact_cases import FAST, PLAIN
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -56,6 +57,7 @@ def test_forms_are_bounded_up_to_their_best_constant(S: list[list[int]], seed: i
         assert not any(d) or judge.bounded(S, [(wide, q * (p - 1))]) == 0
 
 
+@pytest.mark.few(0)
 def test_a_margin_of_a_part_in_a_billion_is_told_from_none():
     rng = np.random.default_rng(0)
     for n, judges in ((5, (PLAIN, FAST)), (24, (PLAIN, FAST)), (60, (FAST,))):

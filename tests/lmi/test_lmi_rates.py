@@ -140,6 +140,7 @@ def test_a_chain_of_two_thousand_followers_has_a_certificate():
     assert lmi.diagonal_rate(A, capped.log_omega) >= capped.rate * (1 - 1e-9)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("n", [4, 40])
 @pytest.mark.parametrize("condition", [None, 50.0])
 def test_clarabel_finds_a_margin_just_below_the_best_rate_and_none_above(n: int, condition: float | None):

@@ -403,6 +403,7 @@ def test_a_large_graph():
         print(f"{size} nodes, {expected}: {time.perf_counter() - start:.2f} s")
 
 
+@pytest.mark.few(0)
 def test_a_line_beside_an_eigenvalue_costs_no_more_than_its_own_component():
     """The ring has 3 +- i sqrt(3), and the line is nearer than any enclosure tells; the followers are dense."""
     r = random.Random(1)

@@ -130,6 +130,7 @@ def test_no_proved_rate_exceeds_the_proved_upper_bound_and_the_best_comes_near(c
     assert 0.85 * float(bound.value) < float(functions[0].rate) <= float(bound.value)
 
 
+@pytest.mark.few(1)
 def test_inputs_and_coordinates_stay_below_their_constants_for_every_member(certified):
     quotient, functions, _ = certified
     rng = np.random.default_rng(2)

@@ -51,6 +51,7 @@ def test_the_bars_of_final_states_are_named(drawn):
     assert names[-3:] == ["proved for every signal", "final states, proved", "deadline $T$"]
 
 
+@pytest.mark.few(0)
 def test_the_decay_of_every_run_lies_below_the_bound(drawn):
     certificate, runs = drawn
     ax = plot_decay(certificate, runs=runs, axis="clock")

@@ -296,6 +296,7 @@ def test_inputs_of_agents_of_order_n_are_drawn_below_their_proved_peak(agents: A
     assert highest <= max(cert.agents.input)
 
 
+@pytest.mark.few(0)
 def test_with_late_messages_their_bound_of_the_input_is_drawn_and_not_that_of_messages_at_once() -> None:
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1), ("a", "c", 2)])
     protocol = NominalProtocol(T=1, rho1=1, rho2=3, kappa=1)

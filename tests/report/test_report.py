@@ -943,6 +943,7 @@ _VEHICLES = {"agents": Agents(order=2, exchange="virtual")}
 _LATE, _SPEED = LateMessages("0.01"), MovingLeaders("0.3")
 
 
+@pytest.mark.few(3)
 @pytest.mark.usefixtures("framed_figures")
 @pytest.mark.parametrize(
     ("parts", "without"),
