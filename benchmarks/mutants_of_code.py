@@ -87,7 +87,7 @@ class Coverage:
         self.tests: dict[str, dict[int, set[str]]] = {}
         for name in data.measured_files():
             of_line = data.contexts_by_lineno(name).items()
-            lines = {line: {context.partition("|")[0] for context in of} - {""} for line, of in of_line}
+            lines = {line: {context.rpartition("|")[0] for context in of} - {""} for line, of in of_line}
             for tests in lines.values():
                 size.update(tests)
             self.tests[name] = lines
@@ -111,6 +111,8 @@ def killed(folder: Path, tests: list[str], minutes: float, *options: str) -> str
         done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, timeout=60 * minutes)
     except subprocess.TimeoutExpired:
         return ""
+    if "ERROR: not found" in done.stdout + done.stderr:
+        raise SystemExit(f"coverage was measured with other tests: {done.stderr}")
     failed = re.findall(r"^(?:FAILED|ERROR) (.*?)(?: - .*)?$", done.stdout, re.M)
     return "" if done.returncode in (0, 5) else (failed or ["collection"])[0]
 
