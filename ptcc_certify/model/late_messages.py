@@ -194,8 +194,11 @@ lambda of L, or measure the own state without delay
         """What is asked by them, in words: late messages, virtual positions, leaders that move, or a cap alone."""
         if not self.exact:
             return self.name
-        if self.vehicles is not None:
-            return "vehicles that exchange virtual positions"
+        return "vehicles that exchange virtual positions" if self.vehicles is not None else self.asked_of_leaders
+
+    @property
+    def asked_of_leaders(self) -> str:
+        """What is asked by their leaders, in words: that they move, disturbances, or a cap alone."""
         if self.leaders is not None and self.leaders.total:
             return "leaders that move" if self.leaders.speed else "disturbances"
         return "a gain cap"

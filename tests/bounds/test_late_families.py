@@ -32,6 +32,8 @@ from ptcc_certify.report.page import report_html
 from ptcc_certify.report.report_file import write_report
 from ptcc_certify.report.statement import report_latex
 
+#: The first follower hears the second, and the other way round: no vector decreases for both.
+EITHER_WAY = [[("a", "c", -1), ("c", "b", -1)], [("a", "b", 1), ("b", "c", -1)]]
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
 UNSURE = Family.from_intervals([("l", "a", 1, 2), ("a", "b", -3, -1), ("b", "a", "-0.5", 0), ("l", "b", -1, -1)])
 
@@ -279,6 +281,21 @@ def test_what_is_asked_of_a_family_under_a_cap_alone_is_told_of_the_cap():
     page = report_html(ptcc.read_certificate(made))
     for word in ("under disturbances", "of its target", "leaders move", "late messages"):
         assert word not in " ".join((made.summary(), text, page)), word
+
+
+@pytest.mark.parametrize(
+    ("more", "asked"),
+    [
+        ({"limits": GainLimits(gain_cap=20)}, "a gain cap"),
+        ({"asks": Asks(delta="0.1")}, "disturbances"),
+        ({"leaders": MovingLeaders(speed=1)}, "leaders that move"),
+    ],
+)
+def test_where_no_vector_of_all_modes_exists_what_was_asked_is_named(more: dict[str, Any], asked: str):
+    modes = [SignedDigraph.from_edges(one) for one in EITHER_WAY]
+    made = certify(dict(zip("mn", modes, strict=True)), PROTOCOL, [1, 2, -3], **more)
+    assert made.assessment.exit_code == 4
+    assert f"left open: {asked} (no vector for the followers was found)" in made.assessment.text
 
 
 @pytest.mark.few(0)
