@@ -1,4 +1,4 @@
-"""The search for diagonal Lyapunov matrices: the best rate by :mod:`lmi.interior_point`, small margins by Clarabel.
+"""The search for diagonal Lyapunov matrices: rates by :mod:`lmi.diagonal_interior_point`, margins by Clarabel.
 
 The solver only proposes: every result is recomputed from eigenvalues of the matrices that it returns, and a
 certificate is proved elsewhere (:mod:`lmi.definiteness_proofs`).
@@ -19,16 +19,16 @@ import numpy as np
 from lmi import child_process
 from lmi.closed_form import h_matrix_diagonal, perron_vectors
 from lmi.definiteness_proofs import no_diagonal_rate_above
+from lmi.diagonal_interior_point import maximise_margin
 from lmi.diagonal_solution import DiagonalCertificate, diagonal_margin, diagonal_rate, scaled
 from lmi.dyadic import round_to_bits
 from lmi.errors import LMIError, MatrixError, NoCertificate
-from lmi.interior_point import maximise_margin
 from lmi.matrix_classes import block_columns, irreducible_blocks, square
 from lmi.schur_coupling import couple_blocks
 from lmi.search_time import checkpoint, seconds_left, uncounted
 
 #: Up to this many rows Clarabel finds the best margin, as the paper does, within half a second; above,
-#: :mod:`lmi.interior_point`.
+#: :mod:`lmi.diagonal_interior_point`.
 CLARABEL_MARGIN_ROWS = 32
 #: Tolerance of a step, the relative gain that is worth another one, and how many steps there are at most, at a given
 #: condition of a matrix of more than so many rows.
@@ -85,8 +85,8 @@ def diagonal_lyapunov(
     tolerance : float
         Relative gap asked of the solver.
     solver : {"clarabel", "interior-point", "sdpa"}, optional
-        Margin only; by default Clarabel up to 32 rows, and :mod:`lmi.interior_point` above and in a forked process.
-        SDPA needs the package sdpa-python.
+        Margin only; by default Clarabel up to 32 rows, and :mod:`lmi.diagonal_interior_point` above and in a forked
+        process. SDPA needs the package sdpa-python.
 
     Returns
     -------

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from lmi.diagonal import diagonal_lyapunov, h_matrix_lyapunov, largest_entry, positive
+from lmi.diagonal_interior_point import maximise_margin
 from lmi.errors import MatrixError
-from lmi.interior_point import maximise_margin
 from lmi.matrix_classes import square
 
 #: A joint rate, in units of the largest entry, below this multiple of the tolerance is noise of the solver.

@@ -31,7 +31,7 @@ from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.model.agents_protocol import AgentsProtocol
 from ptcc_certify.simulation.agents import AgentsTrajectory, simulate_agents
-from ptcc_certify.theorems.agent_decrease import Phase
+from ptcc_certify.theorems.matrix_for_order_n import Phase
 from ptcc_certify.theorems.theorem import Obligation
 
 Intervals = tuple[tuple[tuple[Interval, ...], ...], ...]

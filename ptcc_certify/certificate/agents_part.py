@@ -43,7 +43,7 @@ from ptcc_certify.model import Protocol
 from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.agents_protocol import AgentsProtocol
 from ptcc_certify.simulation.agents import AgentsTrajectory
-from ptcc_certify.theorems.agent_decrease import (
+from ptcc_certify.theorems.matrix_for_order_n import (
     AgentMatrix,
     Matrix,
     Phase,

@@ -25,11 +25,11 @@ from lmi.exact.work import spend
 from ptcc_certify.checker.constrained_switching import reachable_bounds
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import Component, Family
+from ptcc_certify.checker.follower_rows import WeightsBetween
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.protocol import Begin
 from ptcc_certify.checker.reading import RejectedError, need
 from ptcc_certify.checker.row_functions import check_follower_rows
-from ptcc_certify.checker.rows import WeightsBetween
 from ptcc_certify.checker.section_declarations import Nodes, Positive, Several, Vector
 
 

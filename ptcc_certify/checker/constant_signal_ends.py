@@ -24,9 +24,9 @@ from ptcc_certify.checker.common_kernel_ends import agents_heard
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import Component, Edge, Family, Mode
+from ptcc_certify.checker.follower_rows import WeightsBetween
 from ptcc_certify.checker.graph import ordered
 from ptcc_certify.checker.reading import RejectedError, need
-from ptcc_certify.checker.rows import WeightsBetween
 from ptcc_certify.checker.section_declarations import Several, Some
 
 

@@ -19,13 +19,13 @@ from lmi.exact.work import spend
 from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.digraph import Digraph, edges_of
 from ptcc_certify.checker.document import Document
+from ptcc_certify.checker.follower_rows import away_of
 from ptcc_certify.checker.graph import proved_above
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.lyapunov_form import Form
 from ptcc_certify.checker.matrix_products import quadratic
 from ptcc_certify.checker.message_ages import Messages, need_left
 from ptcc_certify.checker.reading import RejectedError, length, need
-from ptcc_certify.checker.rows import away_of
 from ptcc_certify.checker.section_declarations import FewAgents, Positive
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.stated_bounds import Inputs

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from lmi.exact.decimal_rounding import down, up
 from lmi.exact.numbers import integers, longest, shorten, sized
-from lmi.exact.routh_test import nonzero_spectrum_beyond, tractable
+from lmi.exact.spectrum_beyond_line import nonzero_spectrum_beyond, tractable
 from lmi.exact.work import spend
 from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.digraph import Digraph

@@ -15,6 +15,7 @@ from ptcc_certify.checker.delayed_forms import LateForm, SettlingSection, check_
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import Family
+from ptcc_certify.checker.follower_rows import Followers, Rows, followers_of
 from ptcc_certify.checker.graph import MANY_EDGES
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.input_formulas import clock_between, drift_above
@@ -22,7 +23,6 @@ from ptcc_certify.checker.message_ages import Delays, Messages, Moving, check_de
 from ptcc_certify.checker.missed_deadline import MissedDeadline, check_missed, check_staged
 from ptcc_certify.checker.protocol import Begin, Protocol
 from ptcc_certify.checker.reading import length, need
-from ptcc_certify.checker.rows import Followers, Rows, followers_of
 from ptcc_certify.checker.section_declarations import Agents, ByFollower, FollowerNumbers, Positive, Several
 from ptcc_certify.checker.stated_bounds import Decay, Inputs, Residual, Stated, Vehicles, VehiclesSection
 from ptcc_certify.checker.stepwise_bounds import FIXED, Steps

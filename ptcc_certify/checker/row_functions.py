@@ -26,9 +26,9 @@ from ptcc_certify.checker.common_forms import FamilyFunction, FormSection, Scale
 from ptcc_certify.checker.common_kernel_ends import WeightedMean
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import Component, Family, Part
+from ptcc_certify.checker.follower_rows import RowSystem, WeightsBetween
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.reading import need
-from ptcc_certify.checker.rows import RowSystem, WeightsBetween
 from ptcc_certify.checker.section_declarations import Nodes, NotNegative, Positive, Several, Vector
 from ptcc_certify.checker.weighted_squares import SquaresFunction, SquaresSection, check_squares
 

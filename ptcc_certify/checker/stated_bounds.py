@@ -18,10 +18,10 @@ from lmi.exact.decimal_rounding import down, up
 from lmi.exact.numbers import integers, longest, shorten
 from lmi.exact.work import spend
 from ptcc_certify.checker.document import Document
+from ptcc_certify.checker.follower_rows import Followers, Rows
 from ptcc_certify.checker.input_formulas import gain_above
 from ptcc_certify.checker.message_ages import Messages
 from ptcc_certify.checker.reading import RejectedError, length, need
-from ptcc_certify.checker.rows import Followers, Rows
 from ptcc_certify.checker.section_declarations import Agents, Positive
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.structure import Structure

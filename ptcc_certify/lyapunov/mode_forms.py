@@ -22,8 +22,8 @@ from lmi.common_lyapunov import CommonCertificate, best_multipliers, common_lyap
 from lmi.definiteness_proofs import prove_generalized_margin
 from lmi.dyadic import round_to_bits
 from lmi.exact.elementary_enclosures import rounded
+from lmi.matrix_of_each_mode import SwitchedCertificate, switched_lyapunov
 from lmi.search_time import checkpoint
-from lmi.switched import SwitchedCertificate, switched_lyapunov
 from lmi.uncertain_matrix import UncertainMatrix
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.common_forms import CommonForm, form_with_constants, prove_ends, prove_mode

@@ -33,16 +33,16 @@ from ptcc_certify.graphs.io.graph_files import reading_flags
 from ptcc_certify.model.agents import plant_text
 from ptcc_certify.report import html_text as texts
 from ptcc_certify.report.facts.agents import claimed_of
+from ptcc_certify.report.facts.beside_law import beside_law
 from ptcc_certify.report.facts.claim import assumptions
 from ptcc_certify.report.facts.constrained_switching import signal_text
 from ptcc_certify.report.facts.decay import BOUND_KINDS
 from ptcc_certify.report.facts.graph import leader_facts
-from ptcc_certify.report.facts.law import beside_law
 from ptcc_certify.report.facts.of_certificate import facts_of
 from ptcc_certify.report.html_text import rational
 from ptcc_certify.report.page_figures import Counterexamples, counterexamples, draw, inline_figure, run_of_agents
 from ptcc_certify.report.page_states_table import ROWS, states_table
-from ptcc_certify.report.plots.runs import keeps_promise
+from ptcc_certify.report.plots.runs_under_signals import keeps_promise
 from ptcc_certify.report.plots.subject import ideal_text, limits_text
 from ptcc_certify.report.text_layout import arithmetic
 from ptcc_certify.simulation.agents import AgentsTrajectory

@@ -19,9 +19,9 @@ from ptcc_certify.model.base import Protocol
 from ptcc_certify.report.html_text import set_text
 from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.decay import NothingDecays, plot_decay
+from ptcc_certify.report.plots.distributions import plot_degrees, plot_final_states
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.input import plot_input
-from ptcc_certify.report.plots.large_graphs import plot_degrees, plot_final_states
 from ptcc_certify.report.plots.motion import plot_formation, plot_motion
 from ptcc_certify.report.plots.spectrum import plot_spectrum
 from ptcc_certify.report.plots.style import figure_bytes

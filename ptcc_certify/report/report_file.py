@@ -19,7 +19,7 @@ from ptcc_certify.graphs.io.files import refuse_no_path
 from ptcc_certify.graphs.size_limits import REPEATED_NODES, TRACED_NODES
 from ptcc_certify.report.page import rejected_html, report_html
 from ptcc_certify.report.page_figures import draw
-from ptcc_certify.report.plots.runs import sample_runs
+from ptcc_certify.report.plots.runs_under_signals import sample_runs
 from ptcc_certify.report.plots.style import figure_bytes
 from ptcc_certify.report.statement import report_latex
 from ptcc_certify.simulation.trajectory import Trajectory

@@ -1091,7 +1091,7 @@ def test_classify_loads_nothing_heavy():
     loaded = {module.partition(".")[0] for module in modules}
     assert {"ptcc_certify", "numpy", "scipy", "click"} <= loaded
     assert not loaded & {"casadi", "cvxpy", "clarabel", "matplotlib", "networkx", "flint", "rich"}
-    assert not modules & {"lmi.diagonal", "lmi.interior_point", "ptcc_certify.certificate.certificate"}
+    assert not modules & {"lmi.diagonal", "lmi.diagonal_interior_point", "ptcc_certify.certificate.certificate"}
 
 
 # ---------------------------------------------------------------------- progress

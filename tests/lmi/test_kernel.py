@@ -70,7 +70,7 @@ sys.path.insert(0, {str(tmp_path)!r})
 from fractions import Fraction
 from lmi.exact import arithmetic
 from lmi.exact.definite import SparseFactor
-from lmi.exact import numbers, polynomials, routh_test as spectrum, work
+from lmi.exact import numbers, polynomials, spectrum_beyond_line as spectrum, work
 from lmi.exact import elementary_enclosures as enclosure
 from lmi.exact import decimal_rounding as rounding
 judge = arithmetic()

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 from lmi.exact import polynomials
-from lmi.exact import routh_test as spectrum
+from lmi.exact import spectrum_beyond_line as spectrum
 from lmi.exact.polynomials import characteristic, rank
-from lmi.exact.routh_test import nonzero_spectrum_beyond
+from lmi.exact.spectrum_beyond_line import nonzero_spectrum_beyond
 from lmi.exact.work import WorkError, limited
 
 #: Weights of the edges from j to i, by (j, i).

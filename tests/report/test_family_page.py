@@ -29,7 +29,7 @@ from ptcc_certify.report.facts.claim import groups_text
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.plots.input import plot_input
-from ptcc_certify.report.plots.runs import sample_runs
+from ptcc_certify.report.plots.runs_under_signals import sample_runs
 from ptcc_certify.report.plots.trajectory import plot_trajectory
 from ptcc_certify.report.report_file import write_report
 from ptcc_certify.report.screen import certificate_lines, summary_lines

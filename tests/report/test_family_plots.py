@@ -13,7 +13,7 @@ from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.input import plot_input
-from ptcc_certify.report.plots.runs import sample_runs
+from ptcc_certify.report.plots.runs_under_signals import sample_runs
 from ptcc_certify.report.plots.trajectory import plot_trajectory
 from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.simulation.run import simulate

@@ -49,10 +49,10 @@ from ptcc_certify.report.notebook import trajectory_html
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.camp_lines import CAMP_STYLES, NAME_SIZE, NAMED_AGENTS, NAMED_OF_PART
 from ptcc_certify.report.plots.decay import plot_decay
+from ptcc_certify.report.plots.distributions import plot_final_states
 from ptcc_certify.report.plots.graph import GROUND, plot_graph, weight_ranges
 from ptcc_certify.report.plots.graph_layout import FREE_NODES, arc
 from ptcc_certify.report.plots.input import plot_effort, plot_input
-from ptcc_certify.report.plots.large_graphs import plot_final_states
 from ptcc_certify.report.plots.spectrum import CLASS_MARKERS, plot_frontier, plot_spectrum
 from ptcc_certify.report.plots.style import DOUBLE_COLUMN, EDGE_STYLES, SINGLE_COLUMN, STYLE, save_figure
 from ptcc_certify.report.plots.tracking import plot_tracking

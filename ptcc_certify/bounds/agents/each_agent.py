@@ -29,7 +29,7 @@ from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.model.agents_protocol import AgentsProtocol
-from ptcc_certify.theorems.agent_decrease import AgentMatrix, Matrix
+from ptcc_certify.theorems.matrix_for_order_n import AgentMatrix, Matrix
 
 #: Of every agent, in every coordinate of space, its position, velocity and so on.
 States = tuple[tuple[tuple[Fraction, ...], ...], ...]

@@ -13,7 +13,7 @@ from ptcc_certify.bounds.agents.each_agent import root_product
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.simulation.agents import AgentsTrajectory
-from ptcc_certify.theorems.agent_decrease import AgentMatrix
+from ptcc_certify.theorems.matrix_for_order_n import AgentMatrix
 
 #: Tolerances of the integrator within which nothing is told from 0. Its absolute tolerance is a share of the largest:
 #: what fell below some of these is its own error. Without this floor 13 of 160 random cases were above their bounds at

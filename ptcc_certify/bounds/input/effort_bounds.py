@@ -17,7 +17,7 @@ from fractions import Fraction
 import numpy as np
 
 from lmi.exact import arithmetic
-from lmi.exact.routh_test import LARGEST, nonzero_spectrum_beyond, tractable
+from lmi.exact.spectrum_beyond_line import LARGEST, nonzero_spectrum_beyond, tractable
 from ptcc_certify.bounds.final_state.of_graph import Influence
 from ptcc_certify.bounds.input.effort import (
     Effort,

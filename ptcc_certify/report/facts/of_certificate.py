@@ -23,9 +23,9 @@ from ptcc_certify.report.facts.decay import (
 from ptcc_certify.report.facts.graph import family_facts, graph_facts
 from ptcc_certify.report.facts.input import disturbed_facts, family_input_facts, input_facts
 from ptcc_certify.report.facts.late import late_facts
+from ptcc_certify.report.facts.question_and_verdict import protocol_facts, run_facts, verdict_facts
 from ptcc_certify.report.facts.sliding import sliding_facts
 from ptcc_certify.report.facts.states import family_final_facts, final_facts, initial_facts
-from ptcc_certify.report.facts.verdict import protocol_facts, run_facts, verdict_facts
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate

@@ -14,7 +14,7 @@ from ptcc_certify.bounds.envelope import FLOOR_FACTOR
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.model.gain import Gain
-from ptcc_certify.report.plots.runs import bound_label, is_worst, keeps_promise, line_of, runs_of
+from ptcc_certify.report.plots.runs_under_signals import bound_label, is_worst, keeps_promise, line_of, runs_of
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.report.plots.subject import certifies_family, ideal_run_of, ideal_text, limits_text, require_same
 from ptcc_certify.simulation.trajectory import Trajectory

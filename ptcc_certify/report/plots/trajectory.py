@@ -23,7 +23,7 @@ from ptcc_certify.report.plots.camp_lines import (
     family_groups,
     name_agents,
 )
-from ptcc_certify.report.plots.runs import bound_label, count_of_signals, is_worst, runs_of
+from ptcc_certify.report.plots.runs_under_signals import bound_label, count_of_signals, is_worst, runs_of
 from ptcc_certify.report.plots.style import (
     BEHIND,
     BOUND,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ptcc_certify.checker.agent_decrease import scaled_matrix
-from ptcc_certify.theorems.agent_decrease import ScaledAgent, agent_matrix, prove_decrease, with_gains
+from ptcc_certify.theorems.matrix_for_order_n import ScaledAgent, agent_matrix, prove_decrease, with_gains
 
 SEEDS = [pytest.param(seed, marks=pytest.mark.campaign if seed > 2 else ()) for seed in range(40)]
 

@@ -9,7 +9,7 @@ from fractions import Fraction
 import pytest
 
 from lmi.exact.work import WorkError
-from ptcc_certify.checker.rows import Followers, Rows, WeightsBetween
+from ptcc_certify.checker.follower_rows import Followers, Rows, WeightsBetween
 from ptcc_certify.checker.side_files import Numbers
 
 MANY, LONG = 40_000, 10**3990

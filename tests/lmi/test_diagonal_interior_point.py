@@ -14,7 +14,7 @@ from test_lmi import SEEDS, random_h_matrix, random_m_matrix
 from test_lmi_rates import diagonally_stable, signed_laplacian
 
 import lmi
-from lmi.interior_point import Solution, maximise_margin
+from lmi.diagonal_interior_point import Solution, maximise_margin
 
 
 def sparse_laplacian(rng: np.random.Generator, n: int) -> np.ndarray:
@@ -136,9 +136,9 @@ def test_sparse_and_dense_products_agree(monkeypatch: pytest.MonkeyPatch):
     A = sparse_laplacian(np.random.default_rng(2), 120)
     values = []
     for share in (0.0, 1.0):
-        monkeypatch.setattr("lmi.interior_point._SPARSE_SHARE", share)
+        monkeypatch.setattr("lmi.diagonal_interior_point._SPARSE_SHARE", share)
         for rows in (10, 1000):
-            monkeypatch.setattr("lmi.interior_point._LANCZOS_ROWS", rows)
+            monkeypatch.setattr("lmi.diagonal_interior_point._LANCZOS_ROWS", rows)
             values.append(maximise_margin(A / 8, np.ones(120), least=0.0).t)
     assert values == pytest.approx([values[0]] * 4, rel=1e-8)
 

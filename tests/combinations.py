@@ -1,0 +1,118 @@
+"""What goes together: every pair of what may be asked, tried on one small team, and the page that tells.
+
+``python tests/combinations.py`` writes docs/guide/what-goes-together.md anew, from what the program says.
+"""
+
+from __future__ import annotations
+
+import re
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import ptcc_certify as ptcc
+from ptcc_certify.errors import ParameterError
+
+PAGE = Path(__file__).parents[1] / "docs" / "guide" / "what-goes-together.md"
+DAY = ptcc.SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1), ("b", "d", 2)])
+NIGHT = ptcc.SignedDigraph.from_edges([("a", "b", 2), ("a", "c", -1), ("c", "d", -1)])
+BOTH = {"day": DAY, "night": NIGHT}
+START = {"a": 1, "b": 4, "c": -2, "d": 3}
+NOMINAL = ptcc.NominalProtocol(T=1, rho1=1, rho2=6, kappa=1)
+SLIDING = ptcc.SlidingModeProtocol(T_r="0.1", T_s=1, rho1=1, rho2=6, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
+#: What may be asked, in the words of the page, and by which arguments of ``certify``.
+PARTS: dict[str, dict[str, Any]] = {
+    "uncertain weights": {"uncertainty": "10%"},
+    "graphs that switch": {"graph": BOTH},
+    "a dwell time": {"graph": BOTH, "signal": ptcc.DwellTime("0.2")},
+    "shares of the clock": {"graph": BOTH, "signal": ptcc.ClockShares(("0.5", "0.5"))},
+    "a formation": {"agents": {"order": 1, "offsets": {"a": 0, "b": 1, "c": 2, "d": 3}}},
+    "vehicles that tell velocities": {"agents": {"order": 2}},
+    "vehicles that exchange virtual positions": {"agents": {"order": 2, "exchange": "virtual"}},
+    "late messages": {"messages": {"delay": "0.01"}},
+    "rounded values": {"messages": {"value_error": "0.01"}},
+    "leaders that move": {"leaders": {"speed": "0.1"}},
+    "the sliding mode": {"protocol": SLIDING},
+    "disturbances without it": {"asks": {"delta": "0.1"}},
+    "measurement noise": {"asks": {"noise": "0.01"}, "limits": {"gain_cap": 50}},
+    "a gain cap": {"limits": {"gain_cap": 50}},
+    "a stop before T": {"limits": {"stop_before": "0.01"}},
+    "sampling": {"limits": {"gain_cap": 50, "sample_period": "0.001"}},
+    "a set of initial states": {"asks": {"initial_set": 1}},
+}
+KINDS = {
+    "agents": ptcc.Agents,
+    "messages": ptcc.LateMessages,
+    "leaders": ptcc.MovingLeaders,
+    "limits": ptcc.GainLimits,
+    "asks": ptcc.Asks,
+}
+PAIRS = list(combinations(PARTS, 2))
+
+
+def outcome(*names: str) -> str:
+    """Certify the team with some parts: ``yes``, ``open`` if one of them is left open, or why they are refused."""
+    asked: dict[str, Any] = {"asks": {"simulation": False}}
+    for key, value in (item for name in names for item in PARTS[name].items()):
+        if key in KINDS:
+            asked[key] = {**asked.get(key, {}), **value}
+        else:
+            asked[key] = value
+    try:
+        words = {key: KINDS[key](**value) if key in KINDS else value for key, value in asked.items()}
+        made = ptcc.certify(words.pop("graph", DAY), words.pop("protocol", NOMINAL), START, **words)
+    except ParameterError as error:
+        return str(error)
+    return {0: "yes", 4: "open"}[int(made.assessment.exit_code)]
+
+
+def letter(number: int) -> str:
+    """Return a, b, ..., z, aa, ab, ..."""
+    return (letter(number // 26 - 1) if number >= 26 else "") + chr(ord("a") + number % 26)
+
+
+def page(outcomes: dict[tuple[str, str], str]) -> str:
+    """Return the page that tells the outcome of every pair, and each reason once."""
+    names, reasons = list(PARTS), list(dict.fromkeys(x for x in outcomes.values() if x not in ("yes", "open")))
+    signs = {"yes": "+", "open": "~", **{reason: letter(k) for k, reason in enumerate(reasons)}}
+    lines = [
+        INTRODUCTION,
+        "| | | " + " | ".join(map(str, range(1, len(names)))) + " |",
+        "|---" * (len(names) + 1) + "|",
+    ]
+    for k, name in enumerate(names):
+        cells = [signs[outcomes[other, name]] for other in names[:k]]
+        lines.append(f"| {k + 1} | {name} | " + " | ".join(cells + [""] * (len(names) - 1 - k)) + " |")
+    lines += ["", "What is refused, in the program's own words:", "", "| | |", "|---|---|"]
+    lines += [f"| {signs[reason]} | {reason.replace('|', '&#124;')} |" for reason in reasons]
+    return "\n".join(lines) + "\n"
+
+
+INTRODUCTION = """# What goes together
+
+Every pair of what may be asked, tried on one team of four: `+` is certified; of `~` the program takes the question, and
+left a part of it open on this team; a letter names why it is refused. Of three and four that go together in pairs, 60
+drawn at random were certified together.
+
+```sh
+printf 'a,b,1\\nb,c,-1\\nb,d,2\\n' > team.csv
+ptcc certify team.csv --rho2 6 --uncertainty 10% --leader-speed 0.1 --gain-cap 50
+```
+"""
+
+
+def told() -> dict[tuple[str, str], str]:
+    """Read from the page what it tells of every pair."""
+    text = PAGE.read_text("utf-8")
+    rows = [
+        [cell.strip() for cell in line.strip("|").split("|")] for line in re.findall(r"^\| [0-9]+ \|.*$", text, re.M)
+    ]
+    reasons = {"+": "yes", "~": "open"} | dict(re.findall(r"^\| ([a-z]+) \| (.*) \|$", text, re.M))
+    names = [row[1] for row in rows]
+    return {
+        (names[i], names[k]): reasons[row[2 + i]].replace("&#124;", "|") for k, row in enumerate(rows) for i in range(k)
+    }
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page({pair: outcome(*pair) for pair in PAIRS}), "utf-8")

@@ -1,0 +1,17 @@
+"""The page of what goes together is what the program says."""
+
+from __future__ import annotations
+
+import pytest
+from combinations import PAGE, PAIRS, PARTS, outcome, page, told
+
+
+def test_the_page_is_written_of_what_it_tells():
+    assert list(told()) == sorted(PAIRS, key=lambda pair: (list(PARTS).index(pair[1]), list(PARTS).index(pair[0])))
+    assert page({pair: told()[pair] for pair in PAIRS}) == PAGE.read_text("utf-8")
+
+
+@pytest.mark.few(12)
+@pytest.mark.parametrize(("one", "other"), PAIRS)
+def test_a_pair_goes_together_as_the_page_tells(one: str, other: str):
+    assert outcome(one, other) == told()[one, other]
