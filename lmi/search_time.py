@@ -124,9 +124,9 @@ def uncounted() -> Iterator[None]:
 
     Examples
     --------
-    >>> with time_limit(0.01):
+    >>> with time_limit(0.3):
     ...     with uncounted():
-    ...         time.sleep(0.02)
+    ...         time.sleep(0.4)
     ...     checkpoint()
     """
     global _uncounted
