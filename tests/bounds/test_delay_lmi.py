@@ -105,7 +105,6 @@ def test_leaders_that_rest_are_forgiven_any_delay() -> None:
     assert 0 < bounds(star, "0.001", True).longest_delay() < math.inf
 
 
-@pytest.mark.few(0)
 def test_of_a_larger_team_the_first_function_is_taken_and_forgives_longer_delays_than_those_of_the_graph() -> None:
     edges = [(k, (k + step) % 23, sign) for k in range(23) for step, sign in ((1, 1), (5, 2), (7, -1))]
     graph, x0 = SignedDigraph.from_edges(edges), [k % 7 - 3 for k in range(23)]
