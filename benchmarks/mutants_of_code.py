@@ -1,6 +1,6 @@
 """What the tests notice: mutants of the code that proves and checks, and how many of them some test kills.
 
-    python -m pytest --cov=ptcc_certify --cov=lmi --cov-context=test --cov-report=   # with pytest-cov: .coverage
+    python -m pytest --all --cov=ptcc_certify --cov=lmi --cov-context=test --cov-report=   # with pytest-cov: .coverage
     python benchmarks/mutants_of_code.py [--coverage .coverage] [--count 60] [--seed 0] [--part 0/1] [--minutes 2]
 
 A mutant changes one place: a comparison, an operator, an integer by 1, ``and`` for ``or``, ``min`` for ``max``, or it
@@ -80,7 +80,7 @@ def mutant(path: Path, choose: random.Random) -> tuple[str, bytes, range]:
 class Coverage:
     """Which tests ran a line, those first that ran the fewest lines of all, from a file of coverage with contexts."""
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path, known: set[str]):
         from coverage import CoverageData
 
         data = CoverageData(str(path))
@@ -89,7 +89,7 @@ class Coverage:
         self.tests: dict[str, dict[int, set[str]]] = {}
         for name in data.measured_files():
             of_line = data.contexts_by_lineno(name).items()
-            lines = {line: {context.rpartition("|")[0] for context in of} - {""} for line, of in of_line}
+            lines = {line: known.intersection(context.rpartition("|")[0] for context in of) for line, of in of_line}
             for tests in lines.values():
                 size.update(tests)
             self.tests[name] = lines
@@ -97,7 +97,7 @@ class Coverage:
 
     def near(self, module: Path, rows: range, count: int) -> list[str]:
         """Return of the tests of some lines, or of the module where none is told, the first ones and some others."""
-        (lines,) = (lines for name, lines in self.tests.items() if Path(name).as_posix().endswith(f"/{module}"))
+        lines = next((lines for name, lines in self.tests.items() if Path(name).as_posix().endswith(f"/{module}")), {})
         found = set[str]().union(*(lines.get(row, ()) for row in rows)) or set[str]().union(*lines.values())
         order = sorted(found, key=self.rank.__getitem__)
         first, rest = order[: count // 2], order[count // 2 :]
@@ -105,16 +105,28 @@ class Coverage:
         return [*first, *(rest[k * len(rest) // more] for k in range(more))]
 
 
-def killed(folder: Path, tests: list[str], minutes: float, *options: str) -> str:
-    """Run tests until one fails; return which, or nothing, also where they took too long."""
-    words = [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider", *options, *tests]
+def pytest(folder: Path, minutes: float, *options: str) -> subprocess.CompletedProcess[str]:
+    """Run pytest in a copy of the project."""
+    words = [sys.executable, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", *options]
     environment = {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": ""}
-    try:
-        done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, timeout=60 * minutes)
-    except subprocess.TimeoutExpired:
+    return subprocess.run(
+        words, cwd=folder, env=environment, capture_output=True, text=True, timeout=60 * minutes, check=False
+    )
+
+
+def tests_of(folder: Path, *options: str) -> set[str]:
+    """Return the tests that some options select."""
+    return {line for line in pytest(folder, 5, "--collect-only", *options).stdout.splitlines() if "::" in line}
+
+
+def killed(folder: Path, tests: list[str], minutes: float, *options: str) -> str:
+    """Run tests until one fails; return which, "time" where they took too long, or nothing."""
+    if not tests:
         return ""
-    if "ERROR: not found" in done.stdout + done.stderr:
-        raise SystemExit(f"coverage was measured with other tests: {done.stderr}")
+    try:
+        done = pytest(folder, minutes, "-x", *options, *tests)
+    except subprocess.TimeoutExpired:
+        return "time"
     failed = re.findall(r"^(?:FAILED|ERROR) (.*?)(?: - .*)?$", done.stdout, re.M)
     return "" if done.returncode in (0, 5) else (failed or ["collection"])[0]
 
@@ -129,11 +141,13 @@ def main() -> None:
     parser.add_argument("--tests", type=int, default=80, help="of each mutant, at most")
     parser.add_argument("--minutes", type=float, default=2, help="after which a run of tests ends")
     given = parser.parse_args()
-    choose, count, measured = random.Random(given.seed), Counter[str](), Coverage(given.coverage)
+    choose, count = random.Random(given.seed), Counter[str]()
     part, parts = map(int, given.part.split("/"))
     with tempfile.TemporaryDirectory() as base:
         folder = Path(base, "copy")
         shutil.copytree(ROOT, folder, ignore=shutil.ignore_patterns(".git", "*.vo*", "*.glob", ".*_cache", "notebooks"))
+        default, left_out = tests_of(folder), tests_of(folder, "--all", "-m", LEFT_OUT)
+        measured = Coverage(given.coverage, default | left_out)
         for number in range(given.count):
             room = choose.choice(ROOMS)
             modules = sorted(path for path in (ROOT / room).rglob("*.py") if not path.stem.startswith("__"))
@@ -144,10 +158,13 @@ def main() -> None:
             begin, path = time.monotonic(), folder / module.relative_to(ROOT)
             path.write_bytes(text)
             tests = measured.near(module.relative_to(ROOT), rows, given.tests)
-            by = killed(folder, tests, given.minutes)
-            more = "" if by else killed(folder, tests, given.minutes, "--all", "-m", LEFT_OUT)
+            by = killed(folder, [test for test in tests if test in default], given.minutes)
+            rest = [test for test in tests if test in left_out and test not in default]
+            more = "" if by else killed(folder, rest, given.minutes, "--all")
             shutil.copy2(module, path)
-            verdict = "killed" if by else "killed with --all" if more else "survived"
+            verdict = (
+                "time" if "time" in (by, more) else "killed" if by else "killed with --all" if more else "survived"
+            )
             count[verdict] += 1
             seconds, test = time.monotonic() - begin, f"  by {by or more}" if by or more else ""
             print(f"{number:3d} {seconds:5.0f} s {verdict:<17} {module.relative_to(ROOT)} {told}{test}", flush=True)

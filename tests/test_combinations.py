@@ -11,7 +11,7 @@ def test_the_page_is_written_of_what_it_tells():
     assert page({pair: told()[pair] for pair in PAIRS}) == PAGE.read_text("utf-8")
 
 
-@pytest.mark.few(12)
+@pytest.mark.few(6)
 @pytest.mark.parametrize(("one", "other"), PAIRS)
 def test_a_pair_goes_together_as_the_page_tells(one: str, other: str):
     assert outcome(one, other) == told()[one, other]

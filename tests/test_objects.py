@@ -5,6 +5,7 @@ import copy
 import json
 import pickle
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
@@ -103,6 +104,15 @@ def test_a_certificate_tells_what_its_graph_is_called_and_where_its_initial_stat
     named = certify_case(Case(TEAM, PROTOCOL, [5, 2, -4], asks=fast), origins={"graph": "team"})
     assert "team: 3 nodes" in named.summary() and "x(0) given" in named.summary()
     assert named == ptcc.certify(TEAM, PROTOCOL, [5, 2, -4], asks=fast)
+
+
+@pytest.mark.parametrize("more", [{}, {"uncertainty": "10%"}], ids=["graph", "family"])
+def test_origins_are_one_short_line_whoever_wrote_the_file(more: dict[str, Any]):
+    document = ptcc.certify(TEAM, PROTOCOL, [5, 2, -4], asks=ptcc.Asks(simulation=False), **more).to_dict()
+    odd = {"graph": "\x1b[31m\nverdict", "read": "y" * 10**6, "x(0)": ["a"], "sigma(0)": " ", "more": "z"}
+    read = ptcc.read_certificate({**document, "unverified": {**document["unverified"], "origins": odd}})
+    assert read.request.origins == {"graph": "?[31m verdict", "read": "y" * 200}
+    assert "x(0) given" in read.summary() and "\x1b" not in read.summary()
 
 
 def test_results_that_differ_are_not_equal(cert):

@@ -39,6 +39,8 @@ from ptcc_certify.model.constrained_switching import SignalClass
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.theorems.counterexample_text import mode_name
 
+#: Of what it is read where it comes from.
+ORIGINS = ("graph", "read", "x(0)", "v(0)", "a(0)", "sigma(0)")
 #: Members of a word or mixture that are read.
 _MANY = 100
 
@@ -288,7 +290,8 @@ def read_request(unverified: Mapping[str, Any], initial_set: InitialSet | None) 
     """
     section, search, seconds = (unverified.get(key) for key in ("asked", "search", "time_limit"))
     scenario, origins = unverified.get("scenario"), unverified.get("origins")
-    origins = origins.items() if isinstance(origins, dict) else ()
+    origins = origins if isinstance(origins, dict) else {}
+    told = {key: one_line(origins[key][:200]).strip() for key in ORIGINS if isinstance(origins.get(key), str)}
     section = section if isinstance(section, dict) else {}
     method, behaviour = search.get("method") if isinstance(search, dict) else None, section.get("behaviour")
     try:
@@ -308,7 +311,7 @@ def read_request(unverified: Mapping[str, Any], initial_set: InitialSet | None) 
             behaviour, *(_positive(section, key) for key in ("min_rate", "max_input", "max_residual"))
         ),
         scenario=scenario if isinstance(scenario, dict) else None,
-        origins={key: one_line(origin)[:200] for key, origin in origins if isinstance(origin, str)},
+        origins={key: origin for key, origin in told.items() if origin},
     )
 
 

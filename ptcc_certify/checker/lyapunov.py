@@ -8,6 +8,7 @@ from fractions import Fraction
 from typing import Literal
 
 from lmi.exact.decimal_rounding import down, up
+from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.numbers import integers, shorten
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.dominance import Proved, check_dominance
@@ -33,6 +34,8 @@ from ptcc_certify.checker.theorem_function import BlockSection, Paper
 
 #: Lyapunov functions that are read.
 MANY_FUNCTIONS = 100
+#: Bits to which constants are rounded up before they are added.
+SUM_BITS = 64
 #: What the first function has in common with the paper's certificate.
 KEYS = ("coordinates", "blocks", "rho", "rate", "overshoot")
 
@@ -205,7 +208,7 @@ def _deviation(
     constants = list(section.agents)
     failed = first_unbounded(doc.exact, S, D, (c * common**2 / scale for c in constants))  # proves V > 0 besides
     need(failed is None, f"the constant of agent {shorten(labels[failed or 0])} is not proved")
-    if section.norm < sum(constants):
+    if section.norm < sum(rounded(c, SUM_BITS, up=True) for c in constants):
         p, q = (section.norm * common**2 / scale).as_integer_ratio()
         N = combined("the deviation of the norm", (p, S), (-q, final.gram))
         need(p >= 0 and doc.exact.definite(N), "the constant of the norm is not proved")

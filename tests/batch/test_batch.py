@@ -746,7 +746,6 @@ def test_nothing_is_said_after_a_scheduler_was_refused():
     assert "no://h:1: no Dask scheduler answers" in line
 
 
-@pytest.mark.few(0)
 def test_a_batch_that_is_refused_leaves_no_journal(monkeypatch: pytest.MonkeyPatch):
     """The packages and the scheduler are asked for after the journal is locked."""
     write_graph(TRIANGLE, "g.csv")
@@ -980,7 +979,6 @@ def test_files_that_have_changed_are_computed_again(computed: list[str]):
     assert [(row["nodes"], row["error"]) for row in rows] == [(3, None), (3, None), (2, None), (3, None)]
 
 
-@pytest.mark.few(0)
 def test_a_table_is_replaced_only_if_asked(computed: list[str]):
     quickly("spec.toml", output="t.csv")
     before = Path("t.csv").read_bytes()

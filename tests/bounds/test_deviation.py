@@ -28,6 +28,7 @@ from ptcc_certify.checker.final_state import FinalState
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import random_states, read_graph
+from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.lyapunov import search as search_functions
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.asks import Asks
@@ -184,7 +185,7 @@ def signed(document: dict[str, Any]) -> dict[str, Any]:
     return {**document, "digest": digest(document)}
 
 
-@pytest.mark.few(0)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("large", "stdlib"), thinned([(False, False), (False, True), (True, True), (True, False)], 3))
 def test_a_constant_lowered_by_a_millionth_is_rejected(large: bool, stdlib: bool):
     """Of the agent, and of the norm, of every member; in a small graph and, one of the two, in one beyond it."""
@@ -213,6 +214,18 @@ def test_where_its_form_takes_too_long_the_norm_is_bounded_by_the_sum_over_agent
     for function in told["decays"]:
         deviation = function["deviation"]
         assert Fraction(deviation["norm"]) == sum(map(Fraction, deviation["agents"].values()))
+
+
+def test_a_norm_below_the_sum_over_agents_is_proved_by_its_form_or_rejected():
+    told = json.loads(certify(load_graph("fig3a"), NOMINAL, range(6), asks=Asks(simulation=False)).to_json())
+    least = Fraction(told["decays"][0]["deviation"]["norm"])
+    most = sum(map(Fraction, told["decays"][0]["deviation"]["agents"].values()))
+    assert least < most
+    for norm, accepted in ((most, True), ((least + most) / 2, True), (least * Fraction(99, 100), False), (0, False)):
+        said = copy.deepcopy(told)
+        said["decays"][0]["deviation"]["norm"] = format_exact(Fraction(norm))
+        report = check(signed(said))
+        assert report.accepted == accepted and (accepted or report.rejected == "deviation of decays[0]")
 
 
 @pytest.mark.parametrize("n", [3, SMALL_ROWS, SMALL_ROWS + 8])

@@ -331,7 +331,7 @@ def test_the_energy_is_infinite_up_to_half_the_threshold():
         assert cert.effort is not None and (cert.effort.energy is not None) == finite
 
 
-@pytest.mark.few(0)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("slides", [False, True])
 def test_a_forged_integral_of_the_energy_is_rejected(slides: bool):
     graph = load_graph("fig3a")

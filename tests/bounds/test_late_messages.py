@@ -506,6 +506,7 @@ def test_runs_refuse_what_they_cannot_run_by_name() -> None:
     assert simulate_late(nx.DiGraph([(1, 2, {"weight": 1})]), p, late, [1, 0]).states.shape[0] == 2
 
 
+@pytest.mark.few(0)
 def test_certificates_show_and_draw_late_messages_and_moving_leaders() -> None:
     chain, p = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1)]), NominalProtocol(1, 1, 2, 1)
     for name, asked in (("late", {"messages": LateMessages(delay="0.1")}), ("tracking", {"leaders": MovingLeaders(1)})):

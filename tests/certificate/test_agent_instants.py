@@ -130,7 +130,7 @@ def less(rows: list[Any], i: int) -> list[Any]:
     return rows
 
 
-@pytest.mark.few(0)
+@pytest.mark.few(2)
 @pytest.mark.parametrize("kind", ["at rest", "cascade"])
 @pytest.mark.parametrize(
     ("change", "reason"),

@@ -136,7 +136,6 @@ def mutants(boxes: Any) -> list[tuple[tuple[Any, ...], Any]]:
     return found
 
 
-@pytest.mark.few(0)
 @pytest.mark.parametrize("first", thinned(range(14), 14))
 def test_no_mutant_of_a_box_is_accepted_that_is_false(first: int):
     """Every fourteenth of them, from the first on."""

@@ -139,7 +139,6 @@ def test_functions_that_the_check_refuses_are_left_out(monkeypatch):
     assert made.notes[-1] == "the independent check does not take all functions that were found: too many rows"
 
 
-@pytest.mark.few(0)
 def test_what_the_check_refuses_is_not_called_proved(monkeypatch):
     made = certify_family(_three_uncertain_edges(), PROTOCOL, [1, 2, 3])
     text = " ".join("\n".join(summary_lines(made, "net")).split())

@@ -189,7 +189,6 @@ def test_entries_of_c_l_that_cancel_at_the_largest_weights_bound_nothing():
     assert max(shares) > 4
 
 
-@pytest.mark.few(0)
 def test_a_drive_of_cancelled_entries_is_refused():
     certificate, _, cancelled, _, _ = trap()
     data = certificate.to_dict()

@@ -73,7 +73,6 @@ def test_groups_and_followers_end_within_what_is_proved():
             assert not compare(certificate, run).violated
 
 
-@pytest.mark.few(0)
 def test_narrower_ends_than_sliding_variables_leave_are_refused():
     family = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 3), ("b", "c", 1, 2)])
     certificate = certify_family(family, PROTOCOL, [5, 6, 3], sigma0=[9, 8, 1], time_limit=60)

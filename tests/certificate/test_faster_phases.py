@@ -97,7 +97,7 @@ def times(factor: Any) -> Callable[[str], str]:
     return lambda text: str(F(text) * F(factor))
 
 
-@pytest.mark.few(0)
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("path", "change", "reason"),
     [

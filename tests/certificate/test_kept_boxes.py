@@ -135,7 +135,7 @@ def test_no_end_is_accepted_that_is_nearer():
             assert report.accepted or report.reason == "an agent may leave the box"
 
 
-@pytest.mark.few(0)
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     ("change", "reason"),
     [

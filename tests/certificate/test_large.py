@@ -234,7 +234,6 @@ def test_leader_groups_of_hundreds_take_the_best_diagonal_matrix(balanced: bool)
     assert set(found["best"].search.searched) == {"perron", "lmi"}
 
 
-@pytest.mark.few(0)
 @pytest.mark.parametrize("balanced", thinned([True, False], 2))
 def test_forged_rates_of_large_groups_are_rejected(balanced: bool):
     graph = strong_graph(130, balanced, 3)

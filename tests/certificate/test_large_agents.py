@@ -205,7 +205,6 @@ def test_agents_that_begin_in_rest_at_their_places_end_there_exactly():
 # ---------------------------------------------------------------------- what is forged
 
 
-@pytest.mark.few(0)
 @pytest.mark.parametrize("kind", thinned(["double integrators", "with drag in a formation", "cascade"], 2))
 def test_ends_that_are_moved_and_radii_that_are_too_small_are_rejected(kind: str):
     data = document(kind)
@@ -252,7 +251,6 @@ LONG = [
 ]
 
 
-@pytest.mark.few(0)
 @pytest.mark.parametrize("kind", [*LONG, "cascade"])
 def test_mutants_of_final_states_that_are_accepted_are_true(kind: str):
     data = document(kind, 13, 2)

@@ -183,6 +183,7 @@ def deviation_ratio(certificate: Certificate, rng: np.random.Generator) -> float
     return float((moved / deviation_of_signal(certificate, 1 - t)).max())
 
 
+@pytest.mark.few(0)
 @SOME_AND_MORE
 def test_no_admissible_signal_leaves_the_error_bound_of_these_signals(more: bool):
     rng = np.random.default_rng(5)
@@ -271,6 +272,7 @@ def test_a_rate_that_is_asked_for_is_judged_for_these_signals():
     assert certify_family(family, PROTOCOL, expectations=asked).assessment.asked != "met"
 
 
+@pytest.mark.few(0)
 def test_a_rate_that_is_asked_for_is_worth_more_than_a_small_constant():
     """A dwell time in time costs no rate: what is proved for long ones holds for short ones."""
     family, short = slowed_by_switches(), DwellTime("0.02", clock="t")
@@ -619,7 +621,6 @@ def test_shares_that_bring_agents_to_0_say_so(tmp_path: Path):
     assert read_certificate(tmp_path / "c.json").restricted[0].final_states == ((0, 0),) * 4
 
 
-@pytest.mark.few(0)
 def test_no_end_that_shares_do_not_prove_is_accepted(tmp_path: Path):
     day, outage = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", -3)]), SignedDigraph.from_edges([], nodes="ab")
     balanced = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 3)])

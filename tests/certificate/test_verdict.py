@@ -151,7 +151,6 @@ def strong() -> Certificate:
 
 
 @pytest.mark.usefixtures("every_class")
-@pytest.mark.few(0)
 @pytest.mark.parametrize("rate", ["met", "refuted", "left open", None])
 @pytest.mark.parametrize("most", ["met", "refuted", "left open", None])
 @pytest.mark.parametrize("behaviour", ["met", "refuted", None])

@@ -639,7 +639,6 @@ def test_what_was_merged_dropped_or_mirrored_is_said():
 LABELS = ["two words", "a,b", 'say "no"', "ünï ☃ 中", "line\nbreak", "\x1b[31mred", "\x9b2J", "\u202egnihton", "=1"]
 
 
-@pytest.mark.few(0)
 def test_labels_of_any_kind_are_printed_safely_and_kept():
     edges = [(a, b, 1) for a, b in zip(LABELS, LABELS[1:] + LABELS[:1], strict=True)]
     name = save("labels.csv", edges, LABELS)
@@ -689,7 +688,6 @@ def test_a_reader_that_stops_early_is_no_error():
     assert child.returncode == 0
 
 
-@pytest.mark.few(0)
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
 def test_a_full_disk_is_told():
     with Path("/dev/full").open("wb") as full:

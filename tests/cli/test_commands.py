@@ -58,7 +58,7 @@ def test_every_help_fits_80_columns(name: str):
     assert run.code == 0 and max(map(len, run.out.splitlines())) <= 80
 
 
-@pytest.mark.few(0)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("words", [("ptcc_certify", "check"), ("ptcc_certify.checker",)])
 def test_nobody_who_reads_the_output_is_no_traceback_and_no_verdict(words: tuple[str, ...], certificate: str):
     """The code is that of other programs whose reader goes away; on a full disk it is that of bad input."""

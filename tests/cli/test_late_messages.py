@@ -97,7 +97,7 @@ def test_a_behaviour_asked_for_at_T_is_refuted_where_an_agent_is_proved_to_miss_
     assert "this certificate's limit is" in " ".join(left.out.split())
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0)
 @pytest.mark.parametrize(
     ("graph", "delay", "more", "status"),
     thinned(
@@ -207,7 +207,7 @@ def test_followers_track_leaders_that_move_and_the_file_says_so() -> None:
     assert "ever after" in sign.out
 
 
-@pytest.mark.few(1)  # one of each option
+@pytest.mark.few(0)  # one of each option
 @pytest.mark.parametrize(
     ("rows", "words"),
     [

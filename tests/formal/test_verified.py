@@ -530,7 +530,6 @@ def test_a_shorter_path_or_a_lower_energy_than_is_proved_is_rejected(tmp_path: P
             assert not check(mutant).accepted and said(mutant, tmp_path).code == 1, path
 
 
-@pytest.mark.few(0)
 def test_a_lower_peak_than_is_proved_is_rejected(tmp_path: Path) -> None:
     program()
     edges, start = [("a", "b", 1), ("b", "a", -1), ("b", "c", -2), ("c", "d", 1)], [1, 2, 3, -4]

@@ -130,7 +130,7 @@ def middle(interval: Any) -> Fraction:
     return F(interval["mid"] if isinstance(interval, dict) else interval)
 
 
-@pytest.mark.few(0)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", ["plain", "formation in the plane", "every function", "sliding variables"])
 def test_what_is_forged_is_rejected_by_both_checkers(name: str, tmp_path: Path) -> None:
     program()

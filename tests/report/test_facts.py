@@ -230,6 +230,7 @@ def test_disturbances_under_a_cap_leave_a_behaviour_open_and_each_cause_is_named
         assert f"({left} something at T)" in told(asked(x0, limits=cap, expectations=of, **words), "verdict")[0]
 
 
+@pytest.mark.few(0)
 def test_what_is_asked_of_a_family_stands_in_its_file(tmp_path: Path):
     unsure = ptcc.Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 2)])
     asks = ptcc.Asks(simulation=False, expectations=ptcc.Expectations(max_input=1))

@@ -325,6 +325,7 @@ def test_a_statement_that_speaks_of_the_stretched_clock_defines_it():
         assert text.count(r"\ln\frac{") == 1
 
 
+@pytest.mark.few(0)
 @pytest.mark.parametrize("sigma0", thinned([[1, 0, 2], [0, 0, 0]], 2))
 def test_agents_that_listen_to_nobody_end_where_sliding_variables_bring_them(sigma0):
     moved = Family.from_intervals([("a", "c", 1, 3), ("b", "c", 1, 1)])

@@ -907,7 +907,6 @@ def test_figures_without_axes_have_the_style_and_a_column_of_width(tmp_path: Pat
     assert own.xaxis.label.get_size() == plt.rcParams["font.size"]
 
 
-@pytest.mark.few(0)
 def test_saved_figures_appear_whole_and_are_vectors_where_asked(tmp_path: Path) -> None:
     ax = plot_graph(analyse(graph_of("fig1b")))
     for name, head in (("a.png", b"\x89PNG"), ("a.pdf", b"%PDF"), ("a.svg", b"<?xml"), ("B.SVG", b"<?xml")):

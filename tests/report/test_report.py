@@ -371,7 +371,6 @@ def test_the_page_of_a_design_says_what_was_asked_and_of_which_states_its_bounds
     assert "met:" not in text
 
 
-@pytest.mark.few(0)
 def test_hostile_texts_are_shown_as_texts(tmp_path: Path):
     ring = [(HOSTILE[i], HOSTILE[(i + 1) % len(HOSTILE)], (-1) ** i) for i in range(len(HOSTILE))]
     certify(SignedDigraph.from_edges(ring), SLIDING, list(range(len(HOSTILE))), asks=Asks(simulation=False)).save(

@@ -135,7 +135,7 @@ REQUESTS: list[tuple[Any, dict[str, Any], int, str]] = [
 ]
 
 
-@pytest.mark.few(0)
+@pytest.mark.few(8)
 @pytest.mark.parametrize(("protocol", "request_", "code", "says"), REQUESTS, ids=str)
 def test_whatever_is_asked_the_screen_is_short_and_agrees_with_the_exit_code(protocol, request_, code, says):
     certificate = certify_words(PAIR, protocol, [5, 1], simulation=False, **request_)
