@@ -126,9 +126,8 @@ MovingLeaders(speed=0, disturbance=1), None, None)
         if not (messages is not None or leaders is not None or more) or self.sliding or of_order_n:
             return self
         if asks.delta is not None and (leaders is None or not leaders.disturbance):
-            speed, sign = (0, None) if leaders is None else (leaders.speed, leaders.sign_gain)
-            delta = parameter("delta", asks.delta, True)
-            leaders, asks = MovingLeaders(speed, delta, sign), replace(asks, delta=None)
+            disturbance, asks = parameter("delta", asks.delta, True), replace(asks, delta=None)
+            leaders = replace(leaders or MovingLeaders(speed=0), disturbance=disturbance)
         if leaders is not None and not leaders.total and leaders.sign_gain is None:
             leaders = None  # they rest, and nothing disturbs anybody
         if asks.noise is not None and (messages is not None or leaders is not None or of_family):

@@ -55,7 +55,6 @@ def test_delays_of_a_whole_graph_are_certified_that_are_five_times_as_long_as_th
     assert (found.late.longest_delay or 0) > delay
 
 
-@pytest.mark.few(0)
 def test_less_is_left_at_the_deadline_than_by_the_functions_where_both_prove_something() -> None:
     messages = LateMessages("0.0002", own_delay=True, gain_cap=CAP)
     late = certify_words(TEAM, PROTOCOL, [3, 1, 2, -4, 5], messages=messages, simulation=False).late

@@ -130,7 +130,6 @@ def less(rows: list[Any], i: int) -> list[Any]:
     return rows
 
 
-@pytest.mark.few(2)
 @pytest.mark.parametrize("kind", ["at rest", "cascade"])
 @pytest.mark.parametrize(
     ("change", "reason"),
