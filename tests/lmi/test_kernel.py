@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import lmi.exact
+from lmi.exact import work
 
 KERNEL = Path(lmi.exact.__file__).parent
 #: The array twins, and what converts floats to rationals and shows numbers, without computing in floats.
@@ -83,3 +84,13 @@ assert not {{"numpy", "scipy", "flint", "ptcc_certify", "lmi.exact.fast"}} & set
 """
     done = subprocess.run([sys.executable, "-I", "-S", "-c", code], capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("k", range(6))
+def test_each_doubling_of_both_lengths_trebles_what_a_product_costs(k: int):
+    """By Karatsuba's method; in between the cost is linear in the shorter length."""
+    short, long = work.LONG << k, work.LONG << (k + 1)
+    assert work.cost(1, 30 * (short - 1), 30 * (short - 1)) - work.EACH == work.LONG**2 * 3**k
+    between = work.cost(1, 30 * (short + short // 2 - 1), 30 * (long - 1)) - work.EACH
+    assert between == work.LONG**2 * 5 * 3**k // 2
+    assert work.cost(7, 30 * (long - 1), 30 * (short - 1)) == 7 * work.cost(1, 30 * (short - 1), 30 * (long - 1))
