@@ -34,10 +34,10 @@ PARTS: dict[str, dict[str, Any]] = {
     "leaders that move": {"leaders": {"speed": "0.1"}},
     "the sliding mode": {"protocol": SLIDING},
     "disturbances without it": {"asks": {"delta": "0.1"}},
-    "measurement noise": {"asks": {"noise": "0.01"}, "limits": {"gain_cap": 50}},
+    "measurement noise under a gain cap": {"asks": {"noise": "0.01"}, "limits": {"gain_cap": 50}},
     "a gain cap": {"limits": {"gain_cap": 50}},
     "a stop before T": {"limits": {"stop_before": "0.01"}},
-    "sampling": {"limits": {"gain_cap": 50, "sample_period": "0.001"}},
+    "sampling under a gain cap": {"limits": {"gain_cap": 50, "sample_period": "0.001"}},
     "a set of initial states": {"asks": {"initial_set": 1}},
 }
 KINDS = {
@@ -58,6 +58,8 @@ def outcome(*names: str) -> str:
             asked[key] = {**asked.get(key, {}), **value}
         else:
             asked[key] = value
+    if asked.get("limits", {}).keys() == {"gain_cap"} and asked.get("agents", {}).get("order", 1) > 1:
+        asked["agents"] = {**asked["agents"], **asked.pop("limits")}  # a cap of agents of order n is their own
     try:
         words = {key: KINDS[key](**value) if key in KINDS else value for key, value in asked.items()}
         made = ptcc.certify(words.pop("graph", DAY), words.pop("protocol", NOMINAL), START, **words)
@@ -92,7 +94,7 @@ INTRODUCTION = """# What goes together
 
 Every pair of what may be asked, tried on one team of four: `+` is certified; of `~` the program takes the question, and
 left a part of it open on this team; a letter names why it is refused. Of three and four that go together in pairs, 60
-drawn at random were certified together.
+drawn at random were certified together. The reasons are in the words of Python; commands name their own options.
 
 ```sh
 printf 'a,b,1\\nb,c,-1\\nb,d,2\\n' > team.csv
