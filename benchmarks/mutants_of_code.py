@@ -1,7 +1,7 @@
 """What the tests notice: mutants of the code that proves and checks, and how many of them some test kills.
 
     python -m pytest --all --cov=ptcc_certify --cov=lmi --cov-context=test --cov-report=   # with pytest-cov: .coverage
-    python benchmarks/mutants_of_code.py [--coverage .coverage] [--count 60] [--seed 0] [--part 0/1] [--minutes 2]
+    python benchmarks/mutants_of_code.py [--coverage .coverage] [--count 60] [--seed 0] [--first 0] [--part 0/1]
 
 A mutant changes one place: a comparison, an operator, an integer by 1, ``and`` for ``or``, ``min`` for ``max``, or it
 leaves a refusal out. In a copy of this folder the tests that ran its line when coverage was measured run until one
@@ -116,7 +116,10 @@ def pytest(folder: Path, minutes: float, *options: str) -> subprocess.CompletedP
 
 def tests_of(folder: Path, *options: str) -> set[str]:
     """Return the tests that some options select."""
-    return {line for line in pytest(folder, 5, "--collect-only", *options).stdout.splitlines() if "::" in line}
+    done = pytest(folder, 10, "--collect-only", *options)
+    if done.returncode:
+        raise SystemExit(f"the tests cannot be collected:\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
+    return {line for line in done.stdout.splitlines() if "::" in line}
 
 
 def killed(folder: Path, tests: list[str], minutes: float, *options: str) -> str:
@@ -131,12 +134,24 @@ def killed(folder: Path, tests: list[str], minutes: float, *options: str) -> str
     return "" if done.returncode in (0, 5) else (failed or ["collection"])[0]
 
 
+def verdict_of(tests: list[str], by: str, more: str) -> str:
+    """Tell what became of a mutant, from what failed by default and with ``--all``."""
+    if not tests:
+        return "no test is known"
+    if "time" in (by, more):
+        return "time"
+    if by:
+        return "killed"
+    return "killed with --all" if more else "survived"
+
+
 def main() -> None:
     """Make mutants, run their tests, print the shares."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--coverage", type=Path, default=ROOT / ".coverage")
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--first", type=int, default=0, help="the mutant to go on with")
     parser.add_argument("--part", default="0/1", help="K/N: every N-th of them, from the K-th on")
     parser.add_argument("--tests", type=int, default=80, help="of each mutant, at most")
     parser.add_argument("--minutes", type=float, default=2, help="after which a run of tests ends")
@@ -153,7 +168,7 @@ def main() -> None:
             modules = sorted(path for path in (ROOT / room).rglob("*.py") if not path.stem.startswith("__"))
             module = choose.choices(modules, [path.stat().st_size for path in modules])[0]
             told, text, rows = mutant(module, choose)
-            if number % parts != part:
+            if number < given.first or number % parts != part:
                 continue
             begin, path = time.monotonic(), folder / module.relative_to(ROOT)
             path.write_bytes(text)
@@ -162,9 +177,7 @@ def main() -> None:
             rest = [test for test in tests if test in left_out and test not in default]
             more = "" if by else killed(folder, rest, given.minutes, "--all")
             shutil.copy2(module, path)
-            verdict = (
-                "time" if "time" in (by, more) else "killed" if by else "killed with --all" if more else "survived"
-            )
+            verdict = verdict_of(tests, by, more)
             count[verdict] += 1
             seconds, test = time.monotonic() - begin, f"  by {by or more}" if by or more else ""
             print(f"{number:3d} {seconds:5.0f} s {verdict:<17} {module.relative_to(ROOT)} {told}{test}", flush=True)
