@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import random
 import re
 from itertools import combinations
 from pathlib import Path
@@ -66,6 +67,16 @@ def outcome(*names: str) -> str:
     except ParameterError as error:
         return str(error)
     return {0: "yes", 4: "open"}[int(made.assessment.exit_code)]
+
+
+def drawn_together() -> list[tuple[str, ...]]:
+    """Return 40 triples and 20 quadruples, drawn at random of those of which every pair is certified."""
+    known = told()
+    drawn: list[tuple[str, ...]] = []
+    for size, count in ((3, 40), (4, 20)):
+        pool = [some for some in combinations(PARTS, size) if all(known[p] == "yes" for p in combinations(some, 2))]
+        drawn += random.Random(size).sample(pool, count)
+    return drawn
 
 
 def letter(number: int) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from combinations import PAGE, PAIRS, PARTS, outcome, page, told
+from combinations import PAGE, PAIRS, PARTS, drawn_together, outcome, page, told
 
 
 def test_the_page_is_written_of_what_it_tells():
@@ -15,3 +15,9 @@ def test_the_page_is_written_of_what_it_tells():
 @pytest.mark.parametrize(("one", "other"), PAIRS)
 def test_a_pair_goes_together_as_the_page_tells(one: str, other: str):
     assert outcome(one, other) == told()[one, other]
+
+
+@pytest.mark.few(2)
+@pytest.mark.parametrize("parts", drawn_together(), ids=" & ".join)
+def test_three_and_four_that_go_together_in_pairs_go_together(parts: tuple[str, ...]):
+    assert outcome(*parts) == "yes"

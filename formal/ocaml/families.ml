@@ -230,6 +230,7 @@ let lyapunov_of nodes parts modes proof work k v =
 
 (* * The document *)
 let certificate (j : Json.t) : t =
+  Reader.refuse_formation j;
   let may = [ "claim"; "components"; "drives"; "final_state"; "reaching_time"; "messages"; "boxes"; "restricted" ] in
   let get = Reader.opened ~may [ "input" ] j in
   let left = ref [] in

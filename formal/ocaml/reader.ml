@@ -10,6 +10,8 @@ type t = {
   checked : (string * string) list; unchecked : (string * string) list; sections : string list;
   hints : Checker.hints; rest : Json.t list; full : int -> bool (* whether a Lyapunov function is a full matrix *) }
 
+let refuse_formation j = if part "formation" j <> None then unsupported "agents in a formation"
+
 (* keys of every certificate; claims besides the others, which keep their meaning, are named, and not believed, with their
    obligations *)
 let keys = [ "schema"; "producer"; "problem"; "structure"; "decays"; "proof"; "verdict"; "digest"; "unverified" ]
@@ -412,7 +414,7 @@ let edges_into nodes comps edges =
   fun number -> into.(number)
 
 let certificate (j : Json.t) : t =
-  if part "formation" j <> None then unsupported "single integrators in a formation";
+  refuse_formation j;
   let of_agents = part "agents" j <> None in
   let also = [ ("phases", "faster decrease nearer to the deadline"); ("instants", "Lyapunov functions on the way") ] in
   let may = [ "claim"; "components"; "paper"; "overshoot"; "influence"; "final_state"; "reaching_time"; "input"; "messages"; "agents" ] in

@@ -55,14 +55,20 @@ class Formation(NamedTuple):
         return replace(initial_set, center=[x - h for x, h in zip(initial_set.center, self.offsets, strict=True)])
 
 
-def formation_on_a_line(case: Case, agents: Agents, chains: Chains) -> Formation | None:
+def formation_on_a_line(case: Case, agents: Agents, chains: Chains, of_family: bool) -> Formation | None:
     """Return single integrators of the paper's protocol about places: ``x - h`` has the plain certificate.
 
     None for other agents, refused beside what is not asked of them: of order n, in several dimensions, and under a cap
     the sliding-mode protocol, which limits nothing of single integrators. Of large graphs the plain certificate has
     Lyapunov functions that bound no input: formations that ask for nothing but their agents keep that of order n.
     """
-    large = len(chains.offsets) > EXACT_NODES and not asked_of_single_integrators(case)
+    if of_family and chains.dimension > 1:
+        raise ParameterError(
+            "dimension", "a formation of a family is proved on a line, coordinate by coordinate: give one"
+        )
+    if of_family and agents.cap is not None:
+        raise ParameterError("gain_cap", "is for the nominal protocol; leave it out, or change the protocol")
+    large = len(chains.offsets) > EXACT_NODES and not of_family and not asked_of_single_integrators(case)
     if not agents.of_paper or chains.dimension > 1 or large or (agents.cap is not None and case.sliding):
         refuse_agents(case)
         return None
@@ -93,6 +99,7 @@ def with_vehicles(case: Case) -> Case:
     chains = read_chains(agents, graph, case.protocol.gain, case.initial)
     if chains.dimension > 1:
         raise ParameterError("dimension", "what is proved of vehicles on a line holds in each coordinate: give one")
+    in_formation = any(h for (h,) in chains.offsets)
     cap = one_cap([agents.cap, *(limit.gain_cap for limit in case.limits), getattr(case.messages, "gain_cap", None)])
     states = chains.states or ()
     vehicles = Vehicles(tuple(v for ((_, v),) in states) or (Fraction(0),) * graph.n_nodes)
@@ -101,7 +108,8 @@ def with_vehicles(case: Case) -> Case:
     else:
         messages = replace(case.messages, gain_cap=cap, vehicles=vehicles)
     begin = InitialState([x for ((x, _),) in states] or None)
-    return replace(case, graph=given, initial=begin, uncertainty=0, agents=None, messages=messages, limits=())
+    agents = Agents(1, offsets=chains.offsets) if in_formation else None
+    return replace(case, graph=given, initial=begin, uncertainty=0, agents=agents, messages=messages, limits=())
 
 
 def read_offsets(agents: Agents, graph: SignedDigraph, dimension: int, gain: Gain) -> tuple[tuple[Fraction, ...], ...]:

@@ -63,7 +63,7 @@ def _of_family(proof: FamilyProof, certified: bool) -> dict[str, Any]:
     restricted = ends_for_signal(proof) if certified else unknown
     signal = "" if proof.signal == "any" else str(proof.signal)
     return {
-        **_pair("least", "largest", proof.final_state or unknown),
+        **_pair("least", "largest", proof.final_positions or unknown),
         **_pair("restricted_least", "restricted_largest", restricted),
         "restricted_to": ["" if ends is None else signal for ends in restricted],
         **_pair("box_least", "box_largest", _boxes(proof) if certified else unknown),
@@ -87,7 +87,7 @@ def _boxes(proof: FamilyProof) -> list[Interval | None]:
         nodes = proof.parts[number].component.nodes[box.decay.nodes].tolist()
         for v, low, high in zip(nodes, box.lower, box.upper, strict=True):
             result[v] = low, high
-    return result
+    return proof.in_places(result)
 
 
 def _ranges(proof: FamilyProof) -> list[Interval | None]:
@@ -96,7 +96,7 @@ def _ranges(proof: FamilyProof) -> list[Interval | None]:
     for number, ends in proof.ranges.items():
         for v, own in zip(proof.parts[number].component.nodes.tolist(), ends, strict=True):
             result[v] = own
-    return result
+    return proof.in_places(result)
 
 
 def _keeps(proof: FamilyProof) -> np.ndarray:

@@ -173,7 +173,7 @@ def certify_case(
     """
     origins = origins_of(case.graph, case.initial) | dict(origins or {})
     of_family = bool(case.uncertainty or is_family(case.graph))
-    case = with_vehicles(case.with_plain_agents()).with_rows(of_family)
+    case = with_vehicles(case.with_plain_agents(of_family)).with_rows(of_family)
     _refuse_before_reading(case)
     progress, family = listener(progress), _read_family(case) if of_family else None
     graph = as_graph(case.graph) if family is None else family.modes[0].mandatory
@@ -188,7 +188,7 @@ def certify_case(
     chains, formation = None, None
     if agents is not None:
         chains = read_chains(agents, graph, case.protocol.gain, case.initial)
-        formation = formation_on_a_line(case, agents, chains)
+        formation = formation_on_a_line(case, agents, chains, of_family)
     if formation is not None:
         case, chains = formation.case_of(case), None
     request = read_request(structure, case, scenario, origins)
@@ -209,10 +209,10 @@ def certify_case(
             steps = GraphSteps(structure, question, progress)
             wanted = steps.needs_run(case.asks.simulation)
             certificate = steps.certificate(case.asks.disturbance, wanted and state is not None, reaching)
-            if formation is not None:
-                certificate = certificate.changed(offsets=formation.offsets)
             if agents is not None and chains is not None:
                 certificate = with_agents(certificate, agents, chains, wanted)
+        if formation is not None:
+            certificate = certificate.changed(offsets=formation.offsets)
         certificate = with_messages(certificate)
         progress(STEPS[5])
         return with_word_of_check(certificate)

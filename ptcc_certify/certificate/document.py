@@ -79,7 +79,12 @@ def certificate_document(
         sections, more, steps = *_graph_sections(proof, met, out), iter(proof.witnesses)
     sections = {key: part for key, part in sections.items() if part is not None}
     document: dict[str, Any] = {"schema": SCHEMA, "producer": producer(), **sections, "proof": [], "verdict": ""}
-    document |= {**more, **_sections_beside(proof, out), "digest": "", "unverified": write_unverified(certificate)}
+    document |= {
+        **more,
+        **_sections_beside(proof, sections.get("final_state"), out),
+        "digest": "",
+        "unverified": write_unverified(certificate),
+    }
     given = {(o.kind, o.of): write_obligation(o, out) for o in steps}
     document, report = record(document, given, out.files, len(labels))
     return document, out.files, report
@@ -124,8 +129,6 @@ def _graph_sections(proof: GraphProof, met: str | None, out: Writer) -> tuple[di
             more["phases"] = write(Several[PhaseSection], phases, out)
         if agents.instants:
             more["instants"] = write(InstantsSection, agents.instants, out)
-    if proof.offsets is not None:
-        more["formation"] = write(FormationSection, formation_section(proof, proof.offsets, final), out)
     return sections, more
 
 
@@ -155,9 +158,11 @@ def _family_sections(proof: FamilyProof, out: Writer) -> tuple[dict[str, Any], d
     return sections, more
 
 
-def _sections_beside(proof: Proof, out: Writer) -> dict[str, Any]:
-    """Return what is proved with late messages, and while leaders move, as files have it."""
+def _sections_beside(proof: Proof, final: Mapping[str, Any] | None, out: Writer) -> dict[str, Any]:
+    """Return a formation, of which ``final`` is where agents end, and what is proved of late messages and leaders."""
     sections: dict[str, Any] = {}
+    if proof.offsets is not None:
+        sections["formation"] = write(FormationSection, formation_section(proof, proof.offsets, final), out)
     if proof.late is not None and proof.late.says_something:
         sections["messages"] = write(MessagesSection, messages_section(proof.late), out)
     return sections

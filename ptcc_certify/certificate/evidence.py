@@ -298,7 +298,7 @@ class Evidence(OfQuestion, Shown):
         try:
             if proof.late is not None:
                 run = late_run(proof, proof.late)
-                return run if run is None or run.vehicles else self._in_places(run)
+                return None if run is None else self._in_places(run)
             if len(proof.limits) != 1 or not proof.direct:
                 return None
             (limits,) = proof.limits

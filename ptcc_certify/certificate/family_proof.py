@@ -130,8 +130,8 @@ class FamilyProof(Proof):
     boxes: Mapping[int, AttractingBox] = field(default_factory=dict)
     ranges: Mapping[int, tuple[Interval, ...]] = field(default_factory=dict)
 
-    #: Agents of order n and formations are of one graph.
-    agents = offsets = None
+    #: Agents of order n are of one graph, but for those that exchange virtual positions.
+    agents = None
 
     @property
     def family(self) -> Family:
@@ -185,11 +185,6 @@ class FamilyProof(Proof):
     def reading_notes(self) -> tuple[str, ...]:
         """Which of :attr:`notes` are of how the family was read."""
         return self.family.notes
-
-    @property
-    def initial_positions(self) -> tuple[Fraction, ...] | None:
-        """Where agents begin."""
-        return self.initial_state
 
     @property
     def common(self) -> bool:
@@ -307,8 +302,20 @@ class FamilyProof(Proof):
 
     @property
     def final_positions(self) -> FinalEnds | None:
-        """Where agents end: those of families have no places."""
-        return self.final_state
+        """Where agents end: in a formation ``final_state`` is less their places."""
+        ends = self.final_state
+        return ends if ends is None or self.offsets is None else FinalEnds(self.in_places(ends), self.family.labels)
+
+    def in_places(self, ends: Sequence[Interval | None]) -> list[Interval | None]:
+        """Return intervals of ``x - offsets`` of all agents as those of positions."""
+        if self.offsets is None:
+            return list(ends)
+        pairs = zip(ends, self.offsets, strict=True)
+        return [None if pair is None else (pair[0] + h, pair[1] + h) for pair, h in pairs]
+
+    def places_in(self, part: ComponentProof) -> list[Fraction]:
+        """Return the places of the agents of a component, 0 where there is no formation."""
+        return [Fraction(0) if self.offsets is None else self.offsets[v] for v in part.component.nodes.tolist()]
 
     def _state(self, part: ComponentProof) -> list[Fraction]:
         """Return ``x(0) - sigma(0)`` of a component."""

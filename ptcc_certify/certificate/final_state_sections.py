@@ -12,6 +12,7 @@ from ptcc_certify.bounds.final_state.enclosed_ends import agents_ends, influence
 from ptcc_certify.bounds.final_state.of_graph import FinalState, Influence, rounding_radius
 from ptcc_certify.bounds.float_conversion import numbers
 from ptcc_certify.certificate.graph_proof import GraphProof
+from ptcc_certify.certificate.proof import Proof
 from ptcc_certify.certificate.section_io import LONG, Writer, exact_or_ball, interval_text
 from ptcc_certify.checker.final_state import FormationSection, InfluenceSection, LeftNullVector
 from ptcc_certify.checker.obligations import CheckReport
@@ -72,12 +73,13 @@ def _enclose_final_state(proof: GraphProof, out: Writer) -> tuple[InfluenceSecti
     return InfluenceSection(components=groups, containment_weights=None, degenerate=degenerate), final
 
 
-def formation_section(
-    proof: GraphProof, offsets: Sequence[Fraction], final: Mapping[str, Any] | None
-) -> FormationSection:
-    """Return the places of a formation, and where its agents begin and end; ``final`` is where they end less these."""
+def formation_section(proof: Proof, offsets: Sequence[Fraction], final: Mapping[str, Any] | None) -> FormationSection:
+    """Return the places of a formation, and where its agents begin, of one graph also where they end.
+
+    ``final`` is where they end less these.
+    """
     ends = None
-    if final is not None and proof.final_state is not None:
+    if isinstance(proof, GraphProof) and final is not None and proof.final_state is not None:
         pairs: Sequence[Interval] = proof.final_state.intervals or ()
         if not beside(final.get("mid")):
             pairs = list(map(interval, final.values()))

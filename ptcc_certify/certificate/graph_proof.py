@@ -62,9 +62,6 @@ class GraphProof(Proof):
         ``Q``, as it was computed; see ``influence``.
     agents : AgentsAnswer or None
         What is proved of agents of order n; then initial and final states are there, and not above.
-    offsets : tuple of N Fraction, or None
-        Places of single integrators in a formation: initial and final state and everything else are of ``x - offsets``;
-        :attr:`initial_positions` and :attr:`final_positions` are of ``x``.
     """
 
     lyapunov: LyapunovFunction | None
@@ -74,7 +71,6 @@ class GraphProof(Proof):
     final_state: FinalState | None
     matrix: Influence | None
     agents: AgentsAnswer | None = None
-    offsets: tuple[Fraction, ...] | None = None
 
     #: Which notes are of how the graph was read; and there is something to check, whatever was found.
     reading_notes, checkable = (), True
@@ -89,13 +85,6 @@ class GraphProof(Proof):
     def graph(self) -> SignedDigraph:
         """The graph."""
         return self.structure.graph
-
-    @property
-    def initial_positions(self) -> tuple[Fraction, ...] | None:
-        """Where agents begin: in a formation ``initial_state`` is less their places."""
-        if self.offsets is None or self.initial_state is None:
-            return self.initial_state
-        return tuple(x + h for x, h in zip(self.initial_state, self.offsets, strict=True))
 
     @property
     def final_positions(self) -> FinalState | None:

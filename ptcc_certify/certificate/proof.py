@@ -145,12 +145,23 @@ class Proof(OfQuestion):
         What holds with late messages, and while leaders move; None where neither was asked.
     source : Source or None
         The file that it was read from.
+    offsets : tuple of N Fraction, or None
+        Places of agents in a formation on a line: initial and final state and everything else are of ``x - offsets``;
+        :attr:`initial_positions` and ``final_positions`` are of ``x``.
     """
 
     question: Question
     reaching: tuple[ReachingTime, ...] | None = None
     late: LateBounds | None = None
     source: Source | None = None
+    offsets: tuple[Fraction, ...] | None = None
+
+    @property
+    def initial_positions(self) -> tuple[Fraction, ...] | None:
+        """Where agents begin: in a formation ``initial_state`` is less their places."""
+        if self.offsets is None or self.initial_state is None:
+            return self.initial_state
+        return tuple(x + h for x, h in zip(self.initial_state, self.offsets, strict=True))
 
     @property
     def asked_messages(self) -> LateMessages | None:

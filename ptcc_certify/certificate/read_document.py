@@ -65,6 +65,7 @@ def read_document(source: Source) -> tuple[GraphProof | FamilyProof, Observation
         "reaching": read_reaching(sections.get("reaching_time"), protocol),
         "late": with_longest_delays(late, document["unverified"]),
         "source": replace(source, effort=effort),
+        "offsets": tuple(sections["formation"].offsets) if "formation" in sections else None,
     }
     if isinstance(subject, Family):
         return _read_family_proof(source, subject, words), Observations()
@@ -96,7 +97,6 @@ def _read_graph_proof(source: Source, structure: Structure, words: dict[str, Any
         final_state=read_final_state(report, structure),
         matrix=None,
         agents=read_agents(report, structure, words["question"].protocol, functions),
-        offsets=tuple(sections["formation"].offsets) if "formation" in sections else None,
         **words,
     )
 

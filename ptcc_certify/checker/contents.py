@@ -81,6 +81,7 @@ class AnyCertificate:
     producer: str
     structure: Several[StructureSection]
     reaching_time: ReachingTimes | None = None
+    formation: FormationSection | None = None
     messages: MessagesSection | None = None
     proof: list[Any]
     digest: Sha256
@@ -89,10 +90,9 @@ class AnyCertificate:
 
 @dataclass(frozen=True, kw_only=True)
 class OfAgents:
-    """What a certificate of one graph says of agents of order n, and of formations."""
+    """What a certificate of one graph says of agents of order n."""
 
     agents: AgentsSection | CascadeSection | None = None
-    formation: FormationSection | None = None
     phases: Several[PhaseSection] | None = None
     instants: InstantsSection | None = None
 

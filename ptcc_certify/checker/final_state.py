@@ -367,19 +367,22 @@ def _narrow(label: str, off: Any, error: Any, radius: Any, spare: Any) -> None:
         raise RejectedError(f"the interval of agent {shorten(label)} is wider than what is proved")
 
 
-def check_formation(doc: Document, graph: Digraph, begin: Begin) -> None:
-    """Verify that agents of a formation begin and end where the rest of the document tells, and their places added."""
+def check_formation(doc: Document, begin: Begin, of_family: bool = False) -> None:
+    """Verify that agents of a formation begin where the rest of the document tells, and their places added.
+
+    Of one graph that they end there, too; of a family this is left to the reader.
+    """
     if "formation" not in doc:
         return
     need("agents" not in doc, "a formation beside that of agents of order n")
-    section, end = doc.section("formation"), doc.sections["final_state"]
+    section, end = doc.section("formation"), None if of_family else doc.sections["final_state"]
     told = (section.initial_state, begin.state), (section.final_state, end)
     need(all((x is None) == (y is None) for x, y in told), "positions are told iff states are")
     none = Numbers([])
     parts = section.offsets, begin.state or none, section.initial_state or none
     known = [list(part) for part in (*parts, *(end or (none, none)), *(section.final_state or (none, none)))]
     bits = length(chain.from_iterable(known))
-    spend(8 * graph.n, bits, bits, "a formation")
+    spend(8 * len(section.offsets), bits, bits, "a formation")
     h, x, y, mid, r, middle, radius = known
     need(all(a + b == c for a, b, c in zip(x, h, y, strict=False)), "an agent of the formation begins elsewhere")
     ends = zip(mid, h, r, middle, radius, strict=False)

@@ -269,7 +269,6 @@ class Vehicles:
     def __init__(self, doc: Document, messages: Messages, section: VehiclesSection):
         doc.at = "messages.vehicles"
         self.labels, self.messages, self.section = doc.context.labels, messages, section
-        need("formation" not in doc, "vehicles in a formation")
         need(messages.leaders is None or messages.leaders.disturbance == 0, "vehicles that are disturbed")
         capped = messages.gain_cap is not None
         stated = [section.velocity is not None, section.input is not None]

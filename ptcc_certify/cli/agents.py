@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
     from ptcc_certify.graphs.digraph import SignedDigraph
+    from ptcc_certify.graphs.family import Family
     from ptcc_certify.model import Protocol
     from ptcc_certify.simulation.agents import AgentsTrajectory
     from ptcc_certify.simulation.trajectory import Trajectory
@@ -127,7 +128,7 @@ def places_of(options: Options, graph: SignedDigraph, protocol: Protocol) -> Seq
 
 
 def run_in_places(
-    graph: SignedDigraph, protocol: Protocol, x0: Any, places: Sequence[Fraction] | None, **options: Any
+    graph: SignedDigraph | Family, protocol: Protocol, x0: Any, places: Sequence[Fraction] | None, **options: Any
 ) -> Trajectory:
     """Run single integrators; in a formation, if they have places: less these they move as they do without."""
     import numpy as np
@@ -164,9 +165,11 @@ def agents_flags(options: Options) -> str:
 
 def refuse_agents_of_family(options: Options, verb: str) -> None:
     """Refuse agents of order n where a family of graphs is given, by the options that make them or belong to them."""
-    virtual = verb == "certify" and options["exchange"] == "virtual"
-    if virtual or (all(options[name] is None for name in _OWN) and agents_of(options) is None):
+    agents = agents_of(options)
+    if agents is None or (verb == "certify" and agents.virtual):
         return
+    if agents.of_paper and agents.biases is None:
+        return  # in a formation
     flags = agents_flags(options)
     verbs = ("is", "it") if " and " not in flags else ("are", "them")
     mend = f"leave {verbs[1]} out, or {verb} one graph"
@@ -217,6 +220,8 @@ def run_of_agents(case: Case, samples: int, **pattern: Any) -> AgentsTrajectory:
 
     With late messages and moving leaders up to ``T``, messages as old as the ``pattern`` tells.
     """
+    import numpy as np
+
     from ptcc_certify.certificate.certification import certify_case
 
     certificate: Any = certify_case(case)
@@ -226,10 +231,13 @@ def run_of_agents(case: Case, samples: int, **pattern: Any) -> AgentsTrajectory:
 
         x0, v0 = ([float(x) for x in values] for values in (certificate.initial_state, late.vehicles.v0))
         if late.messages.exact and late.leaders is None:
-            return virtual_positions.simulate_vehicles(certificate.graph, tracking, x0, v0, samples=samples)
-        beside = certificate.protocol, late.messages, x0, late.leaders
-        run = virtual_positions.run_virtual_positions(certificate.graph, *beside, **pattern)
-        return virtual_positions.follow_in_motion(run, tracking, late.vehicles.v0)
+            motion = virtual_positions.simulate_vehicles(certificate.graph, tracking, x0, v0, samples=samples)
+        else:
+            beside = certificate.protocol, late.messages, x0, late.leaders
+            run = virtual_positions.run_virtual_positions(certificate.graph, *beside, **pattern)
+            motion = virtual_positions.follow_in_motion(run, tracking, late.vehicles.v0)
+        places = certificate.offsets
+        return motion if places is None else motion.in_places(np.array([float(h) for h in places]))
     part = certificate.agents
     if part is None or (case.graph.n_edges and not part.functions):
         raise ParameterError("no gains of these agents are proved; ptcc certify tells why")

@@ -137,6 +137,8 @@ def _case_of(
         more = any(limit.stop_before is not None or limit.sample_period is not None for limit in limits)
         agents, limits = (replace(agents, gain_cap=None), limits) if more else (agents, ())
         disturbance = disturbance if more or agents.of_paper else None
+    if agents is not None and family and agents.of_paper:
+        agents = replace(agents, gain_cap=None)  # which limits or messages have
     if not family:
         asked.refuse_unheard(one, options)
     messages, leaders = asked.messages_of(graphs, given, options), asked.leaders_of(options)

@@ -190,6 +190,7 @@ def _of_family(family: Family, what: str, options: shared.Options) -> Family | C
     """Return what the figure of a family is drawn from: itself, or its certificate."""
     from ptcc_certify.certificate.certification import certify_case
     from ptcc_certify.certificate.family_certification import STEPS
+    from ptcc_certify.model.agents import Agents
 
     families.refuse_options(options)
     of_agents.refuse_agents_of_family(options, "draw")
@@ -201,13 +202,15 @@ def _of_family(family: Family, what: str, options: shared.Options) -> Family | C
     if what not in OF_A_RUN:
         return family
     protocol = shared.protocol_of(options)
-    x0 = shared.read_initial_state(options["x0"], options["seed"], family.modes[0].mandatory)
+    one = family.modes[0].mandatory
+    x0 = shared.read_initial_state(options["x0"], options["seed"], one)
     if x0 is None:
         raise ParameterError(f"{what} is drawn from an initial state; give one with --x0")
-    sigma0 = shared.sigma0_of(protocol, options, family.modes[0].mandatory)
+    initial = InitialState(x0, shared.sigma0_of(protocol, options, one))
+    places, asks = of_agents.places_of(options, one, protocol), Asks(time_limit=options["time_limit"])
+    agents = None if places is None else Agents(1, offsets=places)
     with progress(STEPS) as begin:
-        asks = Asks(time_limit=options["time_limit"])
-        return certify_case(Case(family, protocol, InitialState(x0, sigma0), asks=asks), progress=begin)
+        return certify_case(Case(family, protocol, initial, agents=agents, asks=asks), progress=begin)
 
 
 def _of_graph(

@@ -109,7 +109,8 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
         raise ParameterError("a figure shows one component per agent; leave out --dimension or write CSV")
     if vectors and options["kind"] != "nominal" and not special:
         raise ParameterError("the sliding-mode protocol is simulated for scalar agents; leave out --dimension")
-    places = None if isinstance(signed, Family) else of_agents.places_of(options, signed, protocol)
+    one = signed.modes[0].mandatory if isinstance(signed, Family) else signed
+    places = of_agents.places_of(options, one, protocol)
     special = special and places is None
     if isinstance(signed, Family):
         _refuse_messages(options, "families of graphs")
@@ -230,7 +231,7 @@ def _run(
     steps = options["steps"]
     times = None if steps is None else [protocol.T * k / steps for k in range(steps + 1)]
     if isinstance(signed, Family):
-        return _run_family(signed, protocol, times, options)
+        return _run_family(signed, protocol, times, options, places)
     if click.get_current_context().get_parameter_source("signal") == ParameterSource.COMMANDLINE:
         raise ParameterError("--signal is for families (--switching, --uncertainty, intervals); this is one graph")
     families.refuse_restricted(options)
@@ -248,10 +249,13 @@ def _run(
 
 
 def _run_family(
-    family: Family, protocol: Protocol, times: list[Fraction] | None, options: shared.Options
+    family: Family,
+    protocol: Protocol,
+    times: list[Fraction] | None,
+    options: shared.Options,
+    places: Sequence[Fraction] | None,
 ) -> Trajectory:
     """Return the run of a family under a signal."""
-    from ptcc_certify.simulation.run import simulate
     from ptcc_certify.simulation.switching_signals import RandomDwellSignal, as_signal
 
     families.refuse_options(options)
@@ -267,4 +271,5 @@ def _run_family(
     played = as_signal(signal, options["seed"]) if promise is None else RandomDwellSignal(promise, options["seed"])
     one = family.modes[0].mandatory
     more = {"sigma0": shared.sigma0_of(protocol, options, one), "samples": options["samples"], "times": times}
-    return simulate(family, protocol, x0, played, disturbance=shared.disturbance_of(protocol, options, one), **more)
+    more |= {"signal": played, "disturbance": shared.disturbance_of(protocol, options, one)}
+    return of_agents.run_in_places(family, protocol, x0, places, **more)

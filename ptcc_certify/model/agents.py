@@ -173,7 +173,7 @@ give 4, from which on the input is bounded
         begin = "= virtual is proved of double integrators"
         if self.degree != 2:
             raise ParameterError("exchange", f"{begin}; these agents are of order {self.degree}: not proved yet")
-        given = {name: getattr(self, name) for name in ("rest", "cascade", "decay", "offsets", "biases")}
+        given = {name: getattr(self, name) for name in ("rest", "cascade", "decay", "biases")}
         name = next((name for name, value in given.items() if value is not None), None)
         name = ("plant" if self.coefficients[0] else "drag") if any(self.coefficients) else name
         if name is not None:

@@ -93,16 +93,19 @@ class Case:
                 return None if isinstance(value, tuple) and not value else value
         return next((value for limit in self.limits if (value := getattr(limit, name, None)) is not None), None)
 
-    def with_plain_agents(self) -> Case:
+    def with_plain_agents(self, of_family: bool = False) -> Case:
         """Return the case without agents that are the paper's; a cap of their gain is one of the limits then.
 
-        Under the sliding-mode protocol limits of the gain are those of agents of order n alone.
+        Of a family a formation stays, without its cap. Under the sliding-mode protocol limits of the gain are those of
+        agents of order n alone.
         """
-        if not isinstance(self.agents, Agents) or not self.agents.plain:
+        agents = self.agents
+        if not isinstance(agents, Agents) or not (agents.plain or (of_family and agents.of_paper)):
             return self
-        if self.agents.cap is None:
-            return replace(self, agents=None)
-        return self if self.sliding else replace(self, agents=None, limits=self.limits_with(self.agents))
+        rest = None if agents.plain else replace(agents, gain_cap=None)
+        if agents.cap is None:
+            return replace(self, agents=rest)
+        return self if self.sliding else replace(self, agents=rest, limits=self.limits_with(agents))
 
     def with_rows(self, of_family: bool = False) -> Case:
         """Return the case with all that is asked beside late messages and moving leaders told as part of these.
@@ -140,7 +143,7 @@ MovingLeaders(speed=0, disturbance=1), None, None)
             messages = LateMessages(value_error=error, leaders=leaders)
         else:
             messages = replace(messages, value_error=messages.value_error + error, leaders=leaders)
-        if cap is not None and messages.gain_cap is None:
+        if cap is not None and (messages.gain_cap is None or (of_family and messages.gain_cap == cap)):
             messages, limits = replace(messages, gain_cap=cap), ()
         return replace(self, messages=messages, leaders=leaders, asks=asks, limits=limits)
 

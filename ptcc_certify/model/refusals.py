@@ -35,7 +35,7 @@ _NOT_OF_AGENTS = {
 _NO_SET = "is not taken up here, bounds are from one initial state; leave it out, and give x0"
 #: What is not proved of double integrators that exchange virtual positions, of all that may be asked.
 _NOT_OF_VEHICLES = ("stop_before", "sample_period", "noise", "delta", "disturbance", "initial_set", "sigma0")
-_WORDS_OF_VEHICLES = {"protocol": "the sliding-mode protocol ", "signal": "a restricted signal "}
+_WORDS_OF_VEHICLES = {"protocol": "the sliding-mode protocol "}
 #: What is not certified beside late messages, and what to do instead.
 _NOT_LATE = {
     "initial_set": _NO_SET,
@@ -81,6 +81,10 @@ def refuse_of_families(case: Case) -> None:
     """Refuse what is asked of one graph alone, where a family is given."""
     given = [] if case.asks.method == "best" else ["method"]
     given += [name for name in NOT_OF_FAMILIES if (value := case.given(name)) is not None and value is not False]
+    if isinstance(case.agents, Agents) and case.agents.of_paper:
+        given.remove("agents")  # in a formation
+        if case.agents.biases is not None:
+            raise ParameterError("biases", "of a family make other places in every graph; give offsets instead")
     if given:
         mend = {"limits": "families take one gain cap alone; leave others out", "delta": _NOT_LATE["delta"]}
         text = "is not for families of graphs yet; leave it out, or certify one graph"
@@ -134,7 +138,6 @@ it out
         "delta": asked["delta"] or (leaders is not None and leaders.disturbance > 0),
         "sign_gain": leaders is not None and leaders.sign_gain is not None,
         "own_delay": messages is not None and messages.own_delay,
-        "signal": case.signal != "any",
     }
     if name := next((name for name, given in asked.items() if given), None):
         what = _WORDS_OF_VEHICLES.get(name, "")

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import as_graph
-from ptcc_certify.model.base import aligned, symbols
+from ptcc_certify.model.base import aligned, position_latex, symbols
 from ptcc_certify.model.casadi_latex import to_latex
 from ptcc_certify.model.gain import Gain
 from ptcc_certify.model.nominal import coupling
@@ -41,7 +41,7 @@ class Vehicles:
 
 @dataclass(frozen=True)
 class TrackingProtocol:
-    """The protocol of double integrators that exchange virtual positions.
+    """The protocol of double integrators that exchange virtual positions; in a formation ``x_k`` is less its place.
 
     Attributes
     ----------
@@ -84,8 +84,10 @@ class TrackingProtocol:
         u = self.input(x, v, z, moved, g, ca.jacobian(g, t))
         return {"t": t, "x": ca.vertcat(x, v, z), "ode": ca.vertcat(v, u, moved)}
 
-    def latex(self) -> str:
+    def latex(self, places: bool = False) -> str:
         r"""Return the protocol of an agent k in LaTeX, printed from its expressions.
+
+        With ``places`` that of a formation, in which ``x_k - h_k`` stands where ``x_k`` does.
 
         Examples
         --------
@@ -96,12 +98,14 @@ class TrackingProtocol:
         """
         import casadi as ca
 
-        names = ("x_{k}", r"\dot{x}_{k}", "z_{k}", r"\dot{z}_{k}", "g", r"\dot{g}")
+        position = position_latex("k", places)
+        names = (position, r"\dot{x}_{k}", "z_{k}", r"\dot{z}_{k}", "g", r"\dot{g}")
         u = self.input(*map(ca.SX.sym, names))
         pull = r"z_{l} - \operatorname{sign}\left(w_{kl}\right) z_{k}"
+        begin = r"x_{k}(0) - h_{k}" if places else "x_{k}(0)"
         rows = [
             f"u_{{k}} &= {to_latex(u)}",
-            rf"\dot{{z}}_{{k}} &= g \sum_{{l=1}}^{{N}} w_{{kl}} \left({pull}\right), \quad z_{{k}}(0) = x_{{k}}(0)",
+            rf"\dot{{z}}_{{k}} &= g \sum_{{l=1}}^{{N}} w_{{kl}} \left({pull}\right), \quad z_{{k}}(0) = {begin}",
             f"g &= {self.gain.capped_latex(self.gain_cap)}",
         ]
         return aligned(rows)

@@ -221,7 +221,7 @@ def protocol_latex(saved: Certificate) -> str:
     if saved.proof.agents is not None:
         return saved.proof.agents.protocol.latex()
     if saved.proof.late is not None and (tracking := saved.proof.late.tracking_protocol) is not None:
-        return tracking.latex()
+        return tracking.latex(places=saved.proof.offsets is not None)
     return saved.protocol.latex(places=saved.proof.offsets is not None)
 
 

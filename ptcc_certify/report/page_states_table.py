@@ -105,9 +105,12 @@ def _of_family(saved: Certificate) -> tuple[str, list[Any], list[str]]:
     if (v0 := saved.proof.velocities) is not None:
         heads.append("Initial velocity")
         rows = [(*begin, rational(v), end) for (*begin, end), v in zip(rows, v0, strict=False)]
+    if (places := saved.proof.offsets) is not None:
+        heads.append("Place h")
+        rows = [(*begin, rational(h), end) for (*begin, end), h in zip(rows, places, strict=False)]
     if all(last is None for *_, last in rows):
         return "Where the agents begin", [(texts.label(name), *cells) for name, *cells, _ in rows], heads
-    every = finals == list(saved.proof.final_state or ())
+    every = finals == list(saved.proof.final_positions or ())
     which = "every signal" if every else "these signals"
     which += "" if saved.protocol.reaching is None else " and disturbance"
     last = "State at the deadline" if rests(saved) else "State at any instant"
@@ -127,7 +130,7 @@ def state_rows(saved: Certificate) -> list[tuple[str, str, str, str | None]]:
             for v in part.component.nodes[side].tolist():
                 camp[v] = f"camp {number}"
     ends = [None if end is None else _ends(end) for end in finals]
-    return list(zip(labels, camp, map(rational, saved.initial_state), ends, strict=True))
+    return list(zip(labels, camp, map(rational, saved.proof.initial_positions or ()), ends, strict=True))
 
 
 def _ends(ends: tuple[Fraction, Fraction] | None) -> str:

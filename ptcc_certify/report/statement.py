@@ -157,7 +157,13 @@ def _of_family(saved: Certificate) -> dict[str, Any]:
         "optional": sum(int(mode.optional[edges].sum()) for mode, edges in parameters),
         "depends": DEPENDS in claims,
         "claims": [(behaviour, (), "", number) for behaviour, number in claims.items()],
-        **{"claims_in_all": len(components), "assumed": assumptions(saved), "offsets": None, "plant": "", "bounds": []},
+        **{
+            "claims_in_all": len(components),
+            "assumed": assumptions(saved),
+            "offsets": proof.offsets,
+            "plant": "",
+            "bounds": [],
+        },
         "promise": "" if proof.signal == "any" else signal_text(proof.signal)[1],
         **{"heads": heads, "rows": rows, "windows": _left_by_windows(saved)},
     }
@@ -288,13 +294,15 @@ def _family_states(saved: Certificate) -> tuple[list[str], list[tuple[str, ...]]
         return [], []
     labels, camps, begins, ends = zip(*rows, strict=True)
     columns = {"Camp": [Markup("--") if camp == "\N{EN DASH}" else camp for camp in camps]}
+    if (places := saved.proof.offsets) is not None:
+        columns["$h_{k}$"] = _in_math(map(texts.rational, places[: texts.LISTED]))
     columns["$x_{k}(0)$"] = _in_math(begins)
     if (v0 := saved.proof.velocities) is not None:
         columns[r"$\dot x_{k}(0)$"] = _in_math(map(texts.rational, v0[: texts.LISTED]))
     if not saved.direct:
         columns[r"$\sigma_{k}(0)$"] = _in_math(map(texts.rational, (saved.sigma0 or ())[: texts.LISTED]))
     if any(end is not None for end in ends):
-        restricted = states_of_signal(saved.family_proof) != list(saved.proof.final_state or ())
+        restricted = states_of_signal(saved.family_proof) != list(saved.proof.final_positions or ())
         head = "at the deadline, restricted" if restricted else "at the deadline"
         columns[head] = ["no limit claimed" if end is None else _in_math([end])[0] for end in ends]
     return list(columns), list(zip(map(latex_of_text, map(_cut, labels)), *columns.values(), strict=True))

@@ -12,7 +12,7 @@ near to ``T``. The common motion is that of one agent without neighbours.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -89,6 +89,12 @@ class AgentsTrajectory(ByAgent):
     def final_state(self) -> np.ndarray:
         """(N, d, n) array: at the last instant, ``T`` or next to it."""
         return self.states[..., -1]
+
+    def in_places(self, places: np.ndarray) -> AgentsTrajectory:
+        """Return the run with places (N,) added to the positions, of agents on a line that ran less these."""
+        states = self.states.copy()
+        states[:, 0, 0] += places[:, None]
+        return replace(self, states=states)
 
     def to_csv(self) -> str:
         r"""Return ``t,remaining,<label>,..,v(<label>),..,u(<label>),..`` as text, one row per instant, floats in full.

@@ -353,7 +353,6 @@ SLIDING = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=
         ({"asks": Asks(noise=1)}, "noise"),
         ({"asks": Asks(delta=1)}, "delta"),
         ({"asks": Asks(initial_set=1)}, "initial_set"),
-        ({"uncertainty": "10%", "signal": "constant"}, "signal"),
     ],
 )
 def test_what_is_not_proved_of_vehicles_is_refused_by_name(parts: dict[str, Any], why: str):
@@ -363,10 +362,10 @@ def test_what_is_not_proved_of_vehicles_is_refused_by_name(parts: dict[str, Any]
         certify(pair, **given)
 
 
-@pytest.mark.parametrize("name", ["drag", "rest", "cascade", "decay", "offsets", "biases"])
+@pytest.mark.parametrize("name", ["drag", "rest", "cascade", "decay", "biases"])
 def test_agents_that_exchange_virtual_positions_have_no_other_protocol(name: str):
     with pytest.raises(ParameterError, match=f"^{name}.*not proved yet"):
-        Agents(order=2, exchange="virtual", **{name: [1, 2] if name in ("offsets", "biases") else 5})
+        Agents(order=2, exchange="virtual", **{name: [1, 2] if name == "biases" else 5})
     with pytest.raises(ParameterError, match="order 3: not proved yet"):
         Agents(order=3, exchange="virtual")
     with pytest.raises(ParameterError, match="exchange"):

@@ -1,5 +1,7 @@
 """Ends between which agents are at the deadline under restricted signals, beside those for every signal.
 
+In a formation these are of positions, places added.
+
 References
 ----------
 docs/theory/families.md, "Restricted signals".
@@ -21,7 +23,8 @@ def last_states(proof: FamilyProof) -> list[Interval | None]:
         nodes = proof.parts[number].component.nodes.tolist()
         for v, ends in zip(nodes, claim.final_states or (), strict=False):
             result[v] = ends
-    return [other if ends is None else ends for ends, other in zip(constant_states(proof), result, strict=True)]
+    pairs = zip(constant_states(proof), proof.in_places(result), strict=True)
+    return [other if ends is None else ends for ends, other in pairs]
 
 
 def constant_states(proof: FamilyProof) -> list[Interval | None]:
@@ -39,12 +42,12 @@ def constant_states(proof: FamilyProof) -> list[Interval | None]:
         nodes = proof.parts[number].component.nodes.tolist()
         for v, ends in zip(nodes, claim.final_states or (), strict=False):
             result[v] = ends
-    return result
+    return proof.in_places(result)
 
 
 def states_of_signal(proof: FamilyProof) -> list[Interval | None]:
     """Return the final states for every signal, and where there are none, those for the signals that were asked for."""
-    pairs = zip(proof.final_state or (), last_states(proof), strict=False)
+    pairs = zip(proof.final_positions or (), last_states(proof), strict=False)
     return [other if ends is None else ends for ends, other in pairs]
 
 
@@ -63,5 +66,5 @@ def ends_for_signal(proof: FamilyProof) -> list[Interval | None]:
     unknown: list[Interval | None] = [None] * proof.family.n_nodes
     if proof.signal == "any":
         return unknown
-    pairs = zip(last_states(proof), proof.final_state or unknown, strict=True)
+    pairs = zip(last_states(proof), proof.final_positions or unknown, strict=True)
     return [every if ends is None else ends for ends, every in pairs]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
+from operator import add
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -123,7 +125,7 @@ def family_claims(
 ) -> Facts:
     """Tell what every component does; where that depends on the signal, why, and what holds all the same."""
     disturbed = certificate is not None and certificate.sigma0 is not None
-    direct, boxes = (True, {}) if certificate is None else (certificate.direct, certificate.family_proof.boxes)
+    direct, boxes = (True, {}) if certificate is None else (certificate.direct, told_boxes(certificate))
     also = " and disturbance" if disturbed else ""
     also += "" if certificate is None else "".join(f", {text}" for text in assumptions(certificate))
     order = sorted(range(len(components)), key=lambda k: -components[k].nodes.size)
@@ -139,7 +141,8 @@ def family_claims(
             yield Fact(head="claim", note=f"... {len(components):,} components in all")
     depending = [k for k in order if components[k].behaviour == DEPENDS]
     for place, k in enumerate(depending):
-        yield from _depends_facts(components[k], direct, detail=place > 0)
+        of = "" if certificate is None or certificate.proof.offsets is None else " (of x - offsets)"
+        yield from _depends_facts(components[k], direct, of, detail=place > 0)
         if k in boxes:
             brief = box_text(components[k], boxes[k], TEXT)
             yield Fact(head="box", note=box_text(components[k], boxes[k]), brief=(brief,), detail=place > 0)
@@ -165,10 +168,10 @@ def _behaviour_texts(component: FamilyComponent, when: str, also: str) -> tuple[
     return text, (f"{text}: camps {named[0]}", f"{text}: camps {named[1]}")
 
 
-def _depends_facts(component: FamilyComponent, direct: bool, detail: bool) -> Facts:
+def _depends_facts(component: FamilyComponent, direct: bool, of: str, detail: bool) -> Facts:
     texts = {}
     if component.counterexample is not None:
-        texts["why"] = printable(counterexample_text(component, component.counterexample, labelled))
+        texts["why"] = printable(counterexample_text(component, component.counterexample, labelled)) + of
     family = component.family
     if len(family.modes) > 1:
         alone = (f"{labelled(mode_name(family, k))}: {_alone(mode, direct)}" for k, mode in enumerate(family.modes))
@@ -178,7 +181,7 @@ def _depends_facts(component: FamilyComponent, direct: bool, detail: bool) -> Fa
         behaviour = "it depends on the weights" if constant.behaviour == DEPENDS else constant.sharpest
         texts["constant"] = f"where weights never change: {behaviour}"
     if component.signal == "any":
-        texts["groups"] = groups_text(component, direct)
+        texts["groups"] = groups_text(component, direct) + of
     for head, text in texts.items():
         brief = (_cut(text),) if head in ("why", "alone") else ()
         yield Fact(head=head, note=text, brief=brief, detail=detail)
@@ -262,9 +265,25 @@ def _agreeing(component: FamilyComponent, groups: Sequence[AgreeingGroup]) -> li
 
 def told_ranges(certificate: Certificate) -> dict[int, tuple[Interval, ...]]:
     """Return between which ends every signal keeps agents, of components of which no last mode tells the same."""
-    last = certificate.family_proof.ends_of_signal
-    same = {k for k, claim in last.items() if isinstance(claim, LastModeClaim) and claim.final_states is not None}
-    return {k: ends for k, ends in certificate.family_proof.ranges.items() if k not in same}
+    proof = certificate.family_proof
+    last = proof.ends_of_signal.items()
+    same = {k for k, claim in last if isinstance(claim, LastModeClaim) and claim.final_states is not None}
+    ranges = {}
+    for k, ends in proof.ranges.items():
+        if k not in same:
+            places = proof.places_in(proof.parts[k])
+            ranges[k] = tuple((low + h, high + h) for (low, high), h in zip(ends, places, strict=True))
+    return ranges
+
+
+def told_boxes(certificate: Certificate) -> dict[int, AttractingBox]:
+    """Return the boxes into which followers are drawn, of positions."""
+    proof, boxes = certificate.family_proof, {}
+    for k, box in proof.boxes.items():
+        places = [proof.places_in(proof.parts[k])[v] for v in box.decay.nodes.tolist()]
+        lower, upper = (tuple(map(add, ends, places)) for ends in (box.lower, box.upper))
+        boxes[k] = replace(box, lower=lower, upper=upper)
+    return boxes
 
 
 def range_text(component: FamilyComponent, ends: Sequence[Interval], width: int = 12 * TEXT) -> str:

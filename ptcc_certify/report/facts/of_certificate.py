@@ -83,7 +83,8 @@ def _answers(certificate: Certificate, origins: Mapping[str, str], details: bool
     beside = _beside(certificate)
     if certificate.of_family:
         components = [part.component for part in certificate.family_proof.parts]
-        yield from family_claims(components, f" at T = {near(protocol.T)}", certificate)
+        of = "" if certificate.proof.offsets is None else " of x - offsets"
+        yield from family_claims(components, f"{of} at T = {near(protocol.T)}", certificate)
     else:
         yield from claim_facts(certificate)
     yield from beside

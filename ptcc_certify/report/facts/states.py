@@ -117,7 +117,7 @@ def family_final_facts(certificate: Certificate) -> Facts:
     ends: Sequence[Interval | None] | None = None
     head, more = "x(T)", ""
     if proof.final_state is not None and proof.common:
-        ends, more = tuple(proof.final_state), every_text(certificate)
+        ends, more = proof.final_positions, every_text(certificate)
     elif proof.final_state is not None and any(one is not None for one in last_states(certificate.family_proof)):
         ends, more = states_of_signal(certificate.family_proof), f"{agreement_text(certificate)} (these signals)"
         head = "x(T)" if rests(certificate) else "x(t)"
@@ -158,7 +158,7 @@ def constant_text(certificate: Certificate, width: int = 12 * TEXT) -> str:
     columns = (
         proof.family.labels,
         constant_states(certificate.family_proof),
-        proof.final_state or (),
+        proof.final_positions or (),
     )
     rows = [row for row in zip(*columns, strict=False) if None not in row]
     if all(interval_text(own) == interval_text(every) for _, own, every in rows):

@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+import numpy as np
+
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.runs_against_bounds import worst_case_signals
 from ptcc_certify.errors import Change, ParameterError
@@ -53,7 +55,10 @@ def sample_runs(certificate: Certificate, signals: Iterable[Signal] | None = Non
     more: dict[str, Any] = {}
     if certificate.sigma0 is not None:
         more = {"sigma0": [float(s) for s in certificate.sigma0], "samples": _SAMPLES}
-    return [simulate(certificate.family_proof.family, certificate.protocol, start, signal, **more) for signal in chosen]
+    family, offsets = certificate.family_proof.family, certificate.proof.offsets
+    runs = [simulate(family, certificate.protocol, start, signal, **more) for signal in chosen]
+    places = None if offsets is None else np.array([float(h) for h in offsets])
+    return runs if places is None else [run.in_places(places) for run in runs]
 
 
 def _signals(certificate: Certificate) -> list[Signal]:

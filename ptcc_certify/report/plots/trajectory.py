@@ -109,14 +109,14 @@ def _draw_signals(
     groups = family_camps(proof.family)
     if groups is None or not all(part.component.behaviour == BIPARTITE_CONSENSUS for part in proof.parts):
         groups = family_groups(proof.family)
-    agents = _extreme_agents(runs[0].states[:, 0])
+    agents = _extreme_agents(runs[0].positions[:, 0])
     for k, style in camp_lines(groups, agents):
         for run in runs:
             worst = is_worst(run)
-            ax.plot(run.t, run.states[k], linewidth=1.1 if worst else 0.5, alpha=1.0 if worst else 0.7, **style)
+            ax.plot(run.t, run.positions[k], linewidth=1.1 if worst else 0.5, alpha=1.0 if worst else 0.7, **style)
             style["label"] = None
     bars = _draw_tubes(ax, certificate, runs[0], agents, groups)
-    values = np.concatenate([bars, *(run.states[agents].ravel() for run in runs)])
+    values = np.concatenate([bars, *(run.positions[agents].ravel() for run in runs)])
     low, high = float(values.min()), float(values.max())
     low, high = (low, high) if low < high else (low - 1, high + 1)
     room = 0.08 * (high - low)
@@ -135,8 +135,12 @@ def _extreme_agents(x: np.ndarray) -> list[int]:
 def _draw_tubes(
     ax: Axes, certificate: Certificate, run: Trajectory, agents: list[int], groups: np.ndarray
 ) -> list[float]:
-    """Shade where the agents of each camp are for every signal; draw the final intervals beyond ``T``, return ends."""
+    """Shade where the agents of each camp are for every signal; draw the final intervals beyond ``T``, return ends.
+
+    In a formation each agent by itself.
+    """
     before = run.remaining > 0
+    offsets = certificate.proof.offsets
     moves = certificate.proof.deviation_bound(run.remaining[before])
     finals = tuple(certificate.family_proof.final_state or ())
     largest = np.zeros(len(groups))  # what the states of a component never exceed
@@ -152,9 +156,11 @@ def _draw_tubes(
         for k in (k for k in agents if groups[k] == name):
             if (interval := finals[k]) is not None:
                 low, high = (float(end) for end in interval)
-                places[low, high, CAMP_STYLES[name][0]] = None
-                tubes.append((np.maximum(low - moves[k], -largest[k]), np.minimum(high + moves[k], largest[k])))
-        if name != "single leaders" and tubes:
+                h = 0.0 if offsets is None else float(offsets[k])
+                places[low + h, high + h, CAMP_STYLES[name][0]] = None
+                tube = np.maximum(low - moves[k], -largest[k]), np.minimum(high + moves[k], largest[k])
+                tubes.append((tube[0] + h, tube[1] + h))
+        if name != "single leaders" and tubes and offsets is None:
             tubes = [(np.min([low for low, _ in tubes], axis=0), np.max([high for _, high in tubes], axis=0))]
         for least, most in tubes:
             colour = CAMP_STYLES[name][0]
