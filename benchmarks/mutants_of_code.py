@@ -60,11 +60,17 @@ def _needs(node: Any) -> bool:
     return isinstance(call, ast.Call) and ast.unparse(call.func).startswith("need")
 
 
-def mutant(path: Path, choose: random.Random) -> tuple[str, bytes, range]:
-    """Return what one change of a module is, the text that it leaves, and its lines from its statement on."""
+def mutant(path: Path, choose: random.Random) -> tuple[str, bytes, range] | None:
+    """Return what one change of a module is, the text that it leaves, and its lines from its statement on.
+
+    None where no place of it could be changed.
+    """
     text = path.read_bytes()
     tree = ast.parse(text)
-    node, kind, new = choose.choice([(node, *change) for node in ast.walk(tree) for change in changes(node)])
+    places = [(node, *change) for node in ast.walk(tree) for change in changes(node)]
+    if not places:
+        return None
+    node, kind, new = choose.choice(places)
     words = "pass" if kind == "refusal" else f"({ast.unparse(new)})"
     lines = text.splitlines(keepends=True)
     begin, end = (
@@ -167,7 +173,9 @@ def main() -> None:
             room = choose.choice(ROOMS)
             modules = sorted(path for path in (ROOT / room).rglob("*.py") if not path.stem.startswith("__"))
             module = choose.choices(modules, [path.stat().st_size for path in modules])[0]
-            told, text, rows = mutant(module, choose)
+            if (changed := mutant(module, choose)) is None:
+                continue  # nothing in it could be another
+            told, text, rows = changed
             if number < given.first or number % parts != part:
                 continue
             begin, path = time.monotonic(), folder / module.relative_to(ROOT)

@@ -253,8 +253,8 @@ class Late:
 
     def steps(
         self, delay: Fraction, error: Fraction, gain_cap: Fraction | None, count: int, push: float = 0.0
-    ) -> tuple[Json, Json, dict[int, Fraction]]:
-        """The part ``steps``, its witness, and bounds at ``T`` in floats with some room."""
+    ) -> tuple[Json, Json, dict[int, Fraction], list[Fraction]]:
+        """The part ``steps``, its witness, and bounds at ``T`` and of inputs under a cap, in floats with some room."""
         A = np.zeros((len(self.followers),) * 2)
         place = {v: i for i, v in enumerate(self.followers)}
         for v, sources in self.heard.items():
@@ -274,6 +274,7 @@ class Late:
             | {self.T - delay * j for j in (1, 2) if delay * j < self.T}
         )
         y = [{v: float(x) for v, x in y0.items()}]
+        peaks = [0.0] * len(self.labels)
         for i, (a, b) in enumerate(pairwise(instants)):
             at = {
                 p: max((m for m, t in enumerate(instants) if t <= a - delay * p / 64), default=0)
@@ -284,6 +285,7 @@ class Late:
             for v in self.followers:
                 told = sum(float(w) * y[at[self.parts[s, v]]][s] for s, w in self.heard[v])
                 h = told / float(self.D[v]) + float(error)
+                peaks[v] = max(peaks[v], self.gain_before(float(b), gain_cap) * float(self.D[v]) * (y[i][v] + h))
                 h += push / (float(self.D[v]) * self.gain_at(float(a), gain_cap)) if math.isfinite(way) else 0.0
                 x = float(self.D[v]) * way
                 decay = 1 / (1 + x + x**2 / 2 + x**3 / 6 + x**4 / 24)
@@ -291,7 +293,20 @@ class Late:
             y.append(new)
         top = max(y[0].values())
         bounds = {v: Fraction(x + len(instants) * top / 2**20) for v, x in y[-1].items()}
-        return {"instants": [text(t) for t in instants]}, {"start": [text(y0[v]) for v in self.followers]}, bounds
+        room = [float(gain_cap or 0) * float(self.D[v]) * len(instants) * top / 2**26 for v in range(len(peaks))]
+        inputs = [Fraction(x * (1 + 1e-9) + more) for x, more in zip(peaks, room, strict=True)]
+        return (
+            {"instants": [text(t) for t in instants]},
+            {"start": [text(y0[v]) for v in self.followers]},
+            bounds,
+            inputs,
+        )
+
+    def gain_before(self, t: float, cap: Fraction | None) -> float:
+        """The gain before an instant, at ``T`` its cap; 0 without one, where nothing bounds it."""
+        if cap is None:
+            return 0.0
+        return float(cap) if t >= float(self.T) else self.gain_at(t, cap)
 
     def gain_at(self, t: float, cap: Fraction | None) -> float:
         gain = float(self.rho1) + float(self.k) / (float(self.T) - t)
@@ -497,8 +512,9 @@ def with_messages(
             )
             said["rows"].append(entry)
     if steps:
-        said["steps"], witness, above = case.steps(delay, error, cap, steps, float(push or 0))
+        said["steps"], witness, above, most = case.steps(delay, error, cap, steps, float(push or 0))
         bounds.append(above)
+        inputs += [] if cap is None else [most]
         proof.append(obligation("late-steps", "messages.steps", witness=witness))
     if bounds:
         least = [min(own[v] for own in bounds) if case.D.get(v) else Fraction(0) for v in range(len(case.labels))]

@@ -19,13 +19,17 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_up, up
+from ptcc_certify.bounds.agents.each_agent import checked_graph
 from ptcc_certify.bounds.delay.case import LateCase
 from ptcc_certify.bounds.delay.decay_by_rows import RowBound
+from ptcc_certify.bounds.delay.decay_by_steps import Steps
 from ptcc_certify.bounds.float_conversion import floats_up
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.stated_bounds import Decay, VehiclesSection, coefficients
+from ptcc_certify.checker.stepwise_inputs import VehicleSteps, Walk
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.follower_rows import FollowerRows
 
 #: How many times faster vehicles track than the virtual states decay.
@@ -115,8 +119,12 @@ class VehicleBounds:
         return row.witness.b < self.a1 and row.witness.b <= self.a2
 
 
-def bound_vehicles(case: LateCase, found: Sequence[RowBound], rows: FollowerRows) -> VehicleBounds | None:
+def bound_vehicles(
+    case: LateCase, found: Sequence[RowBound], rows: FollowerRows, steps: Steps | None = None
+) -> VehicleBounds | None:
     """Return what holds of vehicles that track virtual states, of which some bounds by rows are proved.
+
+    Under a cap of the gain what follows from instant to instant, too, if virtual states are bounded so.
 
     Raises
     ------
@@ -144,6 +152,14 @@ def bound_vehicles(case: LateCase, found: Sequence[RowBound], rows: FollowerRows
             raise ParameterError("v0", f"of {name} is not 0, a leader that moves as it likes here; give it 0")
     if not found:
         return None
+    bounds = _by_rows(case, found, rows)
+    return bounds if steps is None or bounds.input is None else _with_steps(case, steps, bounds)
+
+
+def _by_rows(case: LateCase, found: Sequence[RowBound], rows: FollowerRows) -> VehicleBounds:
+    """Return what holds of vehicles by rows of virtual states."""
+    vehicles = case.messages.vehicles
+    assert vehicles is not None
     a = Fraction(up(FASTER * max(row.witness.b for row in found), 3))
     each = []
     for row in found:
@@ -153,6 +169,41 @@ def bound_vehicles(case: LateCase, found: Sequence[RowBound], rows: FollowerRows
     position, *capped = (np.minimum.reduce(bounds) for bounds in zip(*each, strict=True))
     velocity, push = capped or (None, None)
     return VehicleBounds(a, a, vehicles.v0, position, velocity, push)
+
+
+def _along(case: LateCase, steps: Steps, bounds: VehicleBounds) -> tuple[VehicleSteps, Sequence[int], np.ndarray]:
+    """Follow vehicles from instant to instant; return them at ``T``, and the last bounds of virtual states.
+
+    And in every step what bounds ``|x_k - x*_k|``, ``(m, F)`` floats.
+    """
+    nodes, latency = case.followers.tolist(), case.messages.latencies(case.of)
+    messages = replace(case.exact, latency=Numbers([latency] if isinstance(latency, Fraction) else latency))
+    start, scale = Numbers(list(map(Fraction, steps.start.tolist()))).over(range(len(nodes)))
+    assert isinstance(case.structure, Structure)
+    walk = Walk(messages, checked_graph(case.structure), nodes, steps.instants, start, scale)
+    moved = VehicleSteps(walk, [abs(bounds.v0[v]) for v in nodes], bounds.a1, bounds.a2)
+    lags = np.array([float_up(walk.size * D / bounds.a1) for D in walk.steps.degrees])
+    each = []
+    for i, step in enumerate(walk):
+        moved.step(i, step)
+        each.append((float_up(walk.unit) * np.array(step.begin, float) + lags * np.array(moved.most, float)) * _MORE)
+    return moved, step.end, np.array(each)
+
+
+def deviations_by_steps(case: LateCase, steps: Steps, bounds: VehicleBounds) -> np.ndarray:
+    """Return what bounds ``|x_k - x*_k|`` of vehicles in every step, ``(m, F)`` floats."""
+    return _along(case, steps, bounds)[2]
+
+
+def _with_steps(case: LateCase, steps: Steps, bounds: VehicleBounds) -> VehicleBounds:
+    """Return the bounds with what follows from instant to instant, where that is less."""
+    moved, last, _ = _along(case, steps, bounds)
+    found: dict[str, Any] = {}
+    for name, (factor, values) in moved.bounds(last).items():
+        found[name] = getattr(bounds, name).copy()
+        own = [float_up(factor * x) * _MORE for x in values]
+        found[name][case.followers] = np.minimum(found[name][case.followers], own)
+    return replace(bounds, **found)
 
 
 def _decay(case: LateCase, row: RowBound, drift: Fraction | None) -> Decay:

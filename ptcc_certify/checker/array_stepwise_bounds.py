@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ptcc_certify.checker.stepwise_bounds import FIXED, ONE, Steps
+from ptcc_certify.checker.stepwise_bounds import FIXED, ONE, Step, Steps
 
 #: From ``2^FARTHEST`` units on a decay is rounded up to one unit; half of the bits of a share and of a fixed-point one.
 FARTHEST, HALF_SHARE, HALF = 39, 20, 15
@@ -38,6 +38,11 @@ class ArraySteps(Steps):
 
     def _pushed(self, heard: Any, share: int) -> Any:
         return heard - (-np.asarray(self.lags) * share >> FIXED)
+
+    def larger(self, peaks: Sequence[int], step: Step, share: int) -> Sequence[int]:
+        """Return the larger ones; a share is at most ``2^30``, what two lists add up to below ``2^32``."""
+        moved: Any = np.asarray(step.begin) + step.heard
+        return np.maximum(peaks, -(-moved * share >> FIXED)).tolist()  # type: ignore[no-any-return]
 
     def _step(self, y: Sequence[int], heard: Any, way: tuple[int, int] | None) -> Sequence[int]:
         states = np.asarray(y)

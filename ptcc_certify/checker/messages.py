@@ -9,7 +9,6 @@ from itertools import pairwise
 
 from lmi.exact.decimal_rounding import down
 from lmi.exact.work import spend
-from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.delay_lmi import LateLMI, check_delay_lmi
 from ptcc_certify.checker.delayed_forms import LateForm, SettlingSection, check_form, check_settling
 from ptcc_certify.checker.digraph import Digraph
@@ -18,14 +17,15 @@ from ptcc_certify.checker.family import Family
 from ptcc_certify.checker.follower_rows import Followers, Rows, followers_of
 from ptcc_certify.checker.graph import MANY_EDGES
 from ptcc_certify.checker.input import Verified
-from ptcc_certify.checker.input_formulas import clock_between, drift_above
+from ptcc_certify.checker.input_formulas import drift_above
 from ptcc_certify.checker.message_ages import Delays, Messages, Moving, check_delays, need_left
 from ptcc_certify.checker.missed_deadline import MissedDeadline, check_missed, check_staged
 from ptcc_certify.checker.protocol import Begin, Protocol
 from ptcc_certify.checker.reading import length, need
 from ptcc_certify.checker.section_declarations import Agents, ByFollower, FollowerNumbers, Positive, Several
-from ptcc_certify.checker.stated_bounds import Decay, Inputs, Residual, Stated, Vehicles, VehiclesSection
-from ptcc_certify.checker.stepwise_bounds import FIXED, Steps
+from ptcc_certify.checker.stated_bounds import Decay, Inputs, Residual, Vehicles, VehiclesSection
+from ptcc_certify.checker.stepwise_bounds import Steps
+from ptcc_certify.checker.stepwise_inputs import Walk
 
 #: Witnesses of rows, and instants of steps, that are read.
 MANY_ROWS, MANY_INSTANTS = 100, 2001
@@ -112,8 +112,8 @@ def check_messages(doc: Document, of: Verified | Family, protocol: Protocol, beg
         stated = [one for one in (residual, inputs, vehicles) if one is not None]
         for k, entry in enumerate(section.rows):
             _check_rows(doc, messages, followers, entry, f"messages.rows[{k}]", stated)
-        if isinstance(of, Verified) and section.steps is not None and residual is not None:
-            _check_steps(doc, messages, followers, of.structure.graph, section.steps.instants, residual.stated)
+        if isinstance(of, Verified) and section.steps is not None:
+            _check_steps(doc, messages, followers, of.structure.graph, section.steps.instants, stated)
         if residual is not None:
             residual.close(doc)
         if isinstance(of, Verified) and section.missed is not None:
@@ -183,30 +183,30 @@ def _check_steps(
     followers: Followers,
     graph: Digraph,
     instants: Sequence[Fraction],
-    residual: Stated,
+    stated: Sequence[Residual | Inputs | Vehicles],
 ) -> None:
-    """Verify the start of a solution that never grows, and form its bounds at the deadline."""
+    """Verify the start of a solution that never grows, and form its bounds from instant to instant."""
     doc.at = "messages.steps"
     gain = messages.gain
     need(2 <= len(instants) <= MANY_INSTANTS, f"instants are fewer than 2 or more than {MANY_INSTANTS}")
     need(all(a < b for a, b in pairwise(instants)), "instants do not ascend")
     need(instants[0] == 0 and instants[-1] == gain.T, "instants do not reach from 0 to the deadline")
-    need(messages.delay > 0, "steps though nothing is late")
+    vehicles = any(isinstance(one, Vehicles) for one in stated)
+    need(messages.delay > 0 or (vehicles and messages.gain_cap is not None), "steps though nothing is late")
     start = doc.open("late-steps", "messages.steps")["witness"].start
     need(all(x >= 0 for x in start.values), "start is negative")
     values, scale = start.over(range(len(start)))
-    error, limits = messages.wrong * scale, formulas.Limits(messages.gain_cap)
-    bits = length((gain.T, gain.rho1, gain.k, messages.delay, messages.gain_cap or gain.T, *instants))
-    spend(60 * len(instants), bits, bits, "instants of steps")
-    gains = [limits.gain_at(gain, t) for t in instants[:-1]] if messages.leaders is not None else []
-    push = messages.leaders.push * scale / gains[0] if messages.leaders is not None else Fraction(0)
-    followers.starts_within(values, scale)
-    followers.need_outweighed(values, Fraction(1), error, push, "the start of agent {} may grow")
-    ways = [clock_between(gain, messages.gain_cap, a, b) for a, b in pairwise(instants)]
-    kind, degrees = Steps, [graph.diagonal[v] for v in followers.nodes]
-    if doc.exact.numpy and graph.n_edges >= MANY_EDGES:
+    kind = Steps
+    if doc.exact.numpy and graph.n_edges >= MANY_EDGES and not vehicles:
         from ptcc_certify.checker.array_stepwise_bounds import ArraySteps as kind  # noqa: N813
-    steps = kind(graph, followers.nodes, degrees, values, error, messages.parts, push)
-    bounds = steps.run(instants, messages.delay, ways, gains)
-    residual.meet(followers.nodes, (Fraction(steps.largest, scale << FIXED), bounds))
-    doc.done(f"{len(ways)} steps")
+    walk = Walk(messages, graph, followers.nodes, instants, values, scale, kind)
+    followers.starts_within(values, scale)
+    error = messages.wrong * scale
+    followers.need_outweighed(values, Fraction(1), error, walk.push, "the start of agent {} may grow")
+    followed = [own for own in (one.along(walk) for one in stated) if own is not None]
+    for i, step in enumerate(walk):
+        for own in followed:
+            own.step(i, step)
+    for one in stated:
+        one.by_steps(walk, step.end)
+    doc.done(f"{len(walk.ways)} steps")

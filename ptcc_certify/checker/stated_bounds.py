@@ -24,6 +24,7 @@ from ptcc_certify.checker.message_ages import Messages
 from ptcc_certify.checker.reading import RejectedError, length, need
 from ptcc_certify.checker.section_declarations import Agents, Positive
 from ptcc_certify.checker.side_files import Numbers
+from ptcc_certify.checker.stepwise_inputs import AgentSteps, VehicleSteps, Walk
 from ptcc_certify.checker.structure import Structure
 
 
@@ -125,6 +126,13 @@ class Residual:
         at_T = decay.initial * decay.left + decay.floor + decay.drift
         self.stated.meet(rows.followers.nodes, (at_T / rows.scale, rows.u))
 
+    def along(self, walk: Walk) -> None:
+        """Nothing is to be followed: what is left stands at the last instant."""
+
+    def by_steps(self, walk: Walk, last: Sequence[int]) -> None:
+        """Mark what is at least what bounds from instant to instant leave."""
+        self.stated.meet(walk.steps.nodes, (walk.unit, last))
+
     def close(self, doc: Document) -> None:
         """Verify that a bound meets what is stated of every follower."""
         doc.open("late-residual", "messages.residual")
@@ -149,6 +157,7 @@ class Inputs:
         self.messages, self.gain_cap = messages, messages.gain_cap
         self.stated = Stated("input", doc.context.labels, values)
         need(min(self.stated.values) >= 0, "an input is negative")
+        self.steps: AgentSteps | None = None
 
     def by_rows(self, rows: Rows, decay: Decay) -> None:
         """Mark what is at least ``(2 D_k - b) u_k initial y + gain_cap (highest (D_k u_k + heard_k) + error D_k)``.
@@ -174,6 +183,19 @@ class Inputs:
             (self.gain_cap * decay.highest / (rows.scale * unit), most),
             (self.gain_cap * self.messages.wrong / unit, degrees),
         )
+
+    def along(self, walk: Walk) -> AgentSteps | None:
+        """Return what follows inputs from instant to instant; None without a cap of the gain."""
+        self.steps = None if self.gain_cap is None else AgentSteps(walk)
+        return self.steps
+
+    def by_steps(self, walk: Walk, last: Sequence[int]) -> None:
+        """Mark what is at least ``D_k g m_k`` in every step."""
+        if self.steps is not None:
+            degrees, inside = walk.steps.degrees, set(walk.steps.nodes)
+            self.stated.meet([v for v in range(len(self.stated.met)) if v not in inside])
+            heard = [D * int(x) for D, x in zip(degrees, self.steps.peaks, strict=True)]
+            self.stated.meet(walk.steps.nodes, (walk.size * walk.gains[-1], heard))
 
     def _gain_above(self, b: Fraction, cap: Fraction | None = None) -> Fraction:
         if self.gain_cap is None:
@@ -277,6 +299,7 @@ class Vehicles:
         self.stated = [Stated(name, self.labels, values) for name, values in lists.items() if values is not None]
         need(all(min(one.values) >= 0 for one in self.stated), "a bound is negative")
         self.begun, self.scale = section.v0.over(range(len(self.labels)))
+        self.steps: VehicleSteps | None = None
 
     def by_rows(self, rows: Rows, decay: Decay) -> None:
         """Mark what is at least as large as this decay makes it, unless it is too fast for the gains."""
@@ -296,6 +319,20 @@ class Vehicles:
             factors = [x / common for x, common in zip(row, over, strict=True)]
             one.meet(followers.nodes, *zip(factors, columns, strict=True))
             one.meet(others, (factors[0], [begun[v] for v in others]))
+
+    def along(self, walk: Walk) -> VehicleSteps | None:
+        """Return what follows vehicles from instant to instant; None without a cap of the gain."""
+        if self.messages.gain_cap is not None:
+            begun = [Fraction(abs(self.begun[v]), self.scale) for v in walk.steps.nodes]
+            self.steps = VehicleSteps(walk, begun, self.section.a1, self.section.a2)
+        return self.steps
+
+    def by_steps(self, walk: Walk, last: Sequence[int]) -> None:
+        """Mark what is at least what follows from instant to instant."""
+        if self.steps is not None:
+            bounds = self.steps.bounds(last)
+            for one in self.stated:
+                one.meet(walk.steps.nodes, bounds[one.name])
 
     def close(self, doc: Document) -> None:
         """Verify that a decay meets what is stated of every agent."""

@@ -11,10 +11,11 @@ from __future__ import annotations
 
 from array import array
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from itertools import pairwise
 from math import ceil
+from typing import Any, NamedTuple
 
 from lmi.exact.numbers import longest, sized
 from lmi.exact.work import spend
@@ -40,6 +41,14 @@ def fixed_decay_above(x: int) -> int:
     for n in (4, 3, 2, 1):
         total = ONE + (x * total >> FIXED) // n
     return -(-(ONE * ONE) // total)
+
+
+class Step(NamedTuple):
+    """From one instant to the next: bounds of deviations at both, and in between of what is heard over ``D_k``."""
+
+    begin: Sequence[int]
+    heard: Sequence[int]
+    end: Sequence[int]
 
 
 class Steps:
@@ -72,7 +81,7 @@ class Steps:
         parts: Sequence[int] = (PARTS,),
         push: Fraction = Fraction(0),
     ):
-        self.graph, self.nodes = graph, nodes
+        self.graph, self.nodes, self.degrees = graph, nodes, degrees
         self.largest = max(max(start), 1)
         spend(graph.n_edges + 2 * graph.n, graph.bits + FIXED, longest(start), "bounds from instant to instant")
         self.start = array("q", (-(-(x << FIXED) // self.largest) for x in start))
@@ -93,14 +102,19 @@ class Steps:
                     self.parts.append(parts[e if len(parts) > 1 else 0])
             self.offsets.append(len(self.sources))
 
-    def run(
+    def run(self, *asked: Any) -> Sequence[int]:
+        """Return the bounds at the last instant of :meth:`walk`, multiples of ``largest 2^-30``."""
+        *_, last = self.walk(*asked)
+        return last.end
+
+    def walk(
         self,
         instants: Sequence[Fraction],
         delay: Fraction,
         ways: Sequence[Fraction | None],
         gains: Sequence[Fraction] = (),
-    ) -> Sequence[int]:
-        """Return the bounds at the last instant, multiples of ``largest 2^-30``.
+    ) -> Iterator[Step]:
+        """Yield every step.
 
         Parameters
         ----------
@@ -121,11 +135,11 @@ class Steps:
         for i, (places, way) in enumerate(zip(said, ways, strict=True)):
             for old in [m for m in known if m < places[0]]:
                 del known[old]
-            heard = self._heard({part: known[j] for part, j in zip(ages, places, strict=True)})
+            heard = whole = self._heard({part: known[j] for part, j in zip(ages, places, strict=True)})
             if gains and way is not None:
-                heard = self._pushed(heard, ceil(ONE * gains[0] / gains[i]))
-            known[i + 1] = self._step(known[i], heard, None if way is None else self._fixed(way))
-        return known[len(ways)]
+                whole = self._pushed(heard, ceil(ONE * gains[0] / gains[i]))
+            known[i + 1] = self._step(known[i], whole, None if way is None else self._fixed(way))
+            yield Step(known[i], heard, known[i + 1])
 
     def _fixed(self, way: Fraction) -> tuple[int, int]:
         """Return what the way times the largest degree is, as an integer of ``WAY`` bits, and how far it is shifted."""
@@ -142,6 +156,11 @@ class Steps:
     def _pushed(self, heard: Sequence[int], share: int) -> Sequence[int]:
         """Add what pushes followers under a gain that is the first one over a share."""
         return [h - (-x * share >> FIXED) for h, x in zip(heard, self.lags, strict=True)]
+
+    def larger(self, peaks: Sequence[int], step: Step, share: int) -> Sequence[int]:
+        """Return the larger ones of peaks and of a share, in ``2^-30``, of what agents are off and hear."""
+        rows = zip(peaks, step.begin, step.heard, strict=True)
+        return [max(peak, -(-(y + h) * share >> FIXED)) for peak, y, h in rows]
 
     def _step(self, y: Sequence[int], heard: Sequence[int], way: tuple[int, int] | None) -> Sequence[int]:
         """Bound the next state."""

@@ -458,7 +458,7 @@ def test_steps_of_arrays_are_those_of_integers_and_bound_the_solution(seed: int)
     index = {label: v for v, label in enumerate(drawn.labels)}
     edges = sorted(((index[t], index[s], F(w)) for s, t, w in drawn.edges))
     columns = [s for _, s, _ in edges], [t for t, _, _ in edges], [w for _, _, w in edges]
-    found = []
+    found, largest = [], []
     T, delay, error = F(1), F(int(rng.integers(1, 30)), 100), F(int(rng.integers(0, 2)), 20)
     instants = [F(0), *sorted({F(int(x), 10**6) for x in rng.integers(1, 10**6, 60)}), T]
     ways: list[Fraction | None] = [F(int(rng.integers(0, 10**9)), 10 ** int(rng.integers(6, 12))) for _ in instants[1:]]
@@ -471,8 +471,13 @@ def test_steps_of_arrays_are_those_of_integers_and_bound_the_solution(seed: int)
         followers = own.listening
         degrees = [own.diagonal[v] for v in followers]
         start = [10**6 + int(x) for x in rng.integers(0, 1, len(followers))]
-        found.append(list(steps(own, followers, degrees, start, error * 10**6, parts).run(instants, delay, ways)))
-    assert found[0] == found[1]
+        walked, peaks = steps(own, followers, degrees, start, error * 10**6, parts), [0] * len(followers)
+        for i, step in enumerate(walked.walk(instants, delay, ways)):
+            peaks = walked.larger(peaks, step, 2**30 * (i + 1) // len(ways))
+        found.append(list(walked.run(instants, delay, ways)))
+        largest.append([int(x) for x in peaks])
+        assert list(step.end) == found[-1]
+    assert found[0] == found[1] and largest[0] == largest[1]
     W = np.zeros((own.n, own.n))
     for t, s, w in edges:
         W[t, s] = abs(float(w))
@@ -724,10 +729,11 @@ def test_no_input_is_taken_without_a_cap_or_without_what_bounds_it():
     assert "is not proved" in reason(
         {**forged, "proof": [*forged["proof"], obligation("late-input", "messages.input")]}
     )
-    bare = with_messages(base(1, "mixed", True), "1/50", gain_cap=20, qs=(), steps=40)
-    forged = changed(bare, (*TOP, "input"), stated)
-    forged = {**forged, "proof": [*forged["proof"], obligation("late-input", "messages.input")]}
-    assert "is not proved" in reason(forged)
+    stepwise = with_messages(base(1, "mixed", True), "1/50", gain_cap=20, qs=(), steps=40)
+    assert check(stepwise).accepted
+    for label, x in stepwise["messages"]["input"].items():
+        if x != "0":
+            assert "is not proved" in reason(stepwise, (*TOP, "input", label), str(F(x) * F(999, 1000)))
 
 
 # ---------------------------------------------------------------------- leaders that move

@@ -30,6 +30,8 @@ from ptcc_certify.lyapunov.follower_rows import FollowerRows
 MOST_INSTANTS, MOST_PRODUCTS = 2000, 20_000_000
 #: Instants in one delay, at most, and in each e-fold of the time that is left.
 _IN_DELAY, _IN_E_FOLD = 32, 120
+#: Where nothing is late, in place of a delay, how far the clock goes times the largest degree.
+_WAY = 4
 #: Fewer instants than this say nothing.
 _FEWEST = 20
 #: Integers over ``2^30`` by which the check may form what is formed here in floats.
@@ -52,15 +54,22 @@ class Steps:
         ``y_0``, floats that are taken as they are.
     bounds : (m + 1, F) array
         ``y_i`` in floats, not below what integers over ``2^30`` give.
+    peaks : (F,) array
+        The largest gain times what an agent is off by and hears, likewise; infinite without a cap.
     """
 
     instants: tuple[Fraction, ...]
     start: np.ndarray
     bounds: np.ndarray
+    peaks: np.ndarray
 
     def residual(self) -> np.ndarray:
         """Return what bounds ``|eps(T)|``, ``(F,)`` floats."""
         return np.asarray(self.bounds[-1] * (1 + _MORE) + 1e-300)
+
+    def inputs(self, rows: FollowerRows) -> np.ndarray | None:
+        """Return what bounds ``gain |e|`` up to ``T``, ``(F,)`` floats; None without a cap."""
+        return np.asarray(rows.D * self.peaks * (1 + _MORE) + 1e-300) if np.isfinite(self.peaks).all() else None
 
     def deviation_bound(self, case: LateCase, t: np.ndarray) -> np.ndarray:
         """Return what bounds ``|eps|`` at instants, ``(F, M)`` floats; after ``T`` nothing does while leaders move."""
@@ -97,7 +106,7 @@ def search_steps(case: LateCase, rows: FollowerRows, first: np.ndarray) -> Steps
     Parameters
     ----------
     case : LateCase
-        Something is late.
+        Something is late, or vehicles track under a cap.
     rows : FollowerRows
         Those of the case.
     first : (F,) array
@@ -114,7 +123,11 @@ def search_steps(case: LateCase, rows: FollowerRows, first: np.ndarray) -> Steps
     start = _start(rows, _wrong(case) + _lags(case, rows, (Fraction(0),))[0], first)
     if not 0 < float(start.max()) < np.inf:
         return None
-    return bound_steps(case, rows, instants_of(case.protocol.T, case.messages.age * rows.least_share, most), start)
+    delay = case.messages.age * rows.least_share
+    if not delay:  # vehicles alone, under a cap, whose clock is to go by small parts of the fastest row
+        fastest = Fraction(float(rows.D.max())) * (case.messages.gain_cap or 1)
+        delay = min(case.protocol.T, _WAY / fastest)
+    return bound_steps(case, rows, instants_of(case.protocol.T, delay, most), start)
 
 
 def bound_steps(case: LateCase, rows: FollowerRows, instants: tuple[Fraction, ...], start: np.ndarray) -> Steps:
@@ -123,15 +136,20 @@ def bound_steps(case: LateCase, rows: FollowerRows, instants: tuple[Fraction, ..
     clock, error = case.limited().clock(*_places(case, instants)), _wrong(case)
     size = float(start.max())
     lags = _lags(case, rows, instants[:-1])
+    gains = np.append(case.limited().value(*_places(case, instants[:-1])), float(case.messages.gain_cap or np.inf))
+    peaks = np.zeros(rows.D.size)
     room, bounds = _UNIT * size * (np.diff(rows.W.indptr) + 6.0), [start + _UNIT * size]
     for i in range(1, len(instants)):
         before, heard = bounds[-1], sum(W @ bounds[at[i - 1]] for W, at in parts) / rows.D + error + room
+        moved = before + heard + 2 * _UNIT * size
+        with np.errstate(over="ignore"):
+            peaks = np.maximum(peaks, moved * (gains[i] * (1 + _MORE) + 2 * _UNIT * gains[-1]))
         if np.isfinite(clock[i]):
             heard = heard + lags[i - 1]
         step = clock[i] - clock[i - 1] if np.isfinite(clock[i]) else np.inf
         left = _decay_above(rows.D * max(step, 0.0) * (1 - 1e-9))
         bounds.append(np.minimum(before, heard + np.maximum(before - heard, 0) * left + 4 * _UNIT * size))
-    return Steps(instants, start, np.array(bounds))
+    return Steps(instants, start, np.array(bounds), peaks)
 
 
 def _wrong(case: LateCase) -> float:

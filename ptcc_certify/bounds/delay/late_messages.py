@@ -30,7 +30,13 @@ from ptcc_certify.bounds.delay.small_delays import SmallDelays
 from ptcc_certify.bounds.delay.staged_deadlines import stage_deadlines
 from ptcc_certify.bounds.float_conversion import floats, floats_up
 from ptcc_certify.bounds.instants import instants_from_0
-from ptcc_certify.bounds.virtual_positions import VehicleBounds, bound_vehicles, read_vehicles, vehicles_section
+from ptcc_certify.bounds.virtual_positions import (
+    VehicleBounds,
+    bound_vehicles,
+    deviations_by_steps,
+    read_vehicles,
+    vehicles_section,
+)
 from ptcc_certify.checker.delay_lmi import LateLMIWitness
 from ptcc_certify.checker.delayed_forms import LateFormWitness, SettlingWitness
 from ptcc_certify.checker.message_ages import Delays, Packets
@@ -279,18 +285,39 @@ class LateBounds:
         """
         t = instants_from_0(t)
         if self.vehicles is not None:
-            return self.vehicles.over_time(self.case, self.rows, t)[0][self.followers]
+            return self.vehicles_over_time(t)[0][self.followers]
         least = np.full((self.followers.size, t.size), np.inf)
         bounds = [one.deviation_bound(self.case, t) for one in self.of_followers]
         bounds += [one.deviation_bound(self.case, t)[self.followers] for one in self.of_all]
         settled = self.direct & (t > float(self.case.protocol.T))
         return np.where(settled, 0.0, np.minimum.reduce([least, *bounds]))
 
+    def vehicles_over_time(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return what bounds deviations and velocities of vehicles at instants, ``(N, M)`` floats.
+
+        See :meth:`ptcc_certify.bounds.virtual_positions.VehicleBounds.over_time`.
+        """
+        assert self.vehicles is not None
+        position, velocity = self.vehicles.over_time(self.case, self.rows, t)
+        if self.steps is not None and self.vehicles.input is not None:
+            before = t <= float(self.case.protocol.T)
+            steps = np.searchsorted([float(x) for x in self.steps.instants[1:-1]], t[before] * (1 - 1e-15))
+            own = np.full(position.shape, np.inf)
+            own[np.ix_(self.followers, before)] = self._vehicles_by_steps[steps].T
+            position = np.minimum(position, own)
+        return position, velocity
+
+    @cached_property
+    def _vehicles_by_steps(self) -> np.ndarray:
+        assert self.vehicles is not None
+        assert self.steps is not None
+        return deviations_by_steps(self.case, self.steps, self.vehicles)
+
     def largest_bound(self, t: Sequence[float] | np.ndarray) -> np.ndarray:
         """Return what bounds the largest of these of all agents, ``(M,)`` floats, as :meth:`deviation_bound` does."""
         t = instants_from_0(t)
         if self.vehicles is not None:  # leaders that have a velocity move, too
-            return np.asarray(self.vehicles.over_time(self.case, self.rows, t)[0].max(axis=0))
+            return np.asarray(self.vehicles_over_time(t)[0].max(axis=0))
         least = self.deviation_bound(t).max(axis=0, initial=0)
         if self.of_all:  # leaders deviate, too
             leaders = np.setdiff1d(np.arange(len(self.labels)), self.followers)
@@ -328,14 +355,16 @@ def bound_late(case: LateCase) -> LateBounds:
     rows = late_rows(case)
     first, steps = away(case, rows), None
     found = search_rows(case, rows, first)
-    if messages.age and messages.vehicles is None and of_graph and not case.signed:
+    followed = messages.age or (messages.vehicles is not None and messages.gain_cap is not None)
+    if followed and of_graph and not case.signed:
         with suppress(LMIError):
             steps = search_steps(case, rows, first)
     each = [one.residual() for one in (*found, steps) if one is not None]
-    inputs = [bound for bound in (row.inputs(case, rows) for row in found) if bound is not None]
-    bounds = replace(bounds, rows=found, steps=steps, residual=_least(rows, each), input=_least(rows, inputs))
+    inputs = [row.inputs(case, rows) for row in found] + ([] if steps is None else [steps.inputs(rows)])
+    push = _least(rows, [bound for bound in inputs if bound is not None])
+    bounds = replace(bounds, rows=found, steps=steps, residual=_least(rows, each), input=push)
     if messages.vehicles is not None:
-        return replace(bounds, vehicles=bound_vehicles(case, found, rows))
+        return replace(bounds, vehicles=bound_vehicles(case, found, rows, steps))
     if not _may_be_staged(case):
         return bounds
     missed = find_missed(case, rows.followers.tolist())

@@ -89,7 +89,7 @@ def _vehicles(late: LateBounds) -> Facts:
     gains = "a_1 = a_2" if proved.a1 == proved.a2 else f"a_1 = {near(proved.a1)}, a_2"
     yield Fact(head="agents", note=f"{text}, and track them: {gains} = {near(proved.a2)}")
     shares, percent = (0.5, 0.9, 0.99), np.arange(1, 100)  # drives are summed up from instant to instant
-    over_time = proved.over_time(late.case, late.rows, float(late.gain.gain.T) * percent / 100)
+    over_time = late.vehicles_over_time(float(late.gain.gain.T) * percent / 100)
     position, velocity = (bounds[:, np.isin(percent, (50, 90, 99))] for bounds in over_time)
     whole = FROM_WITHIN_1 if late.relative else ""
     for name, bounds in (("deviations", position), ("velocities", velocity)):
