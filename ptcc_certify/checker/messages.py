@@ -199,10 +199,11 @@ def _check_steps(
     kind = Steps
     if doc.exact.numpy and graph.n_edges >= MANY_EDGES and not vehicles:
         from ptcc_certify.checker.array_stepwise_bounds import ArraySteps as kind  # noqa: N813
-    walk = Walk(messages, graph, followers.nodes, instants, values, scale, kind)
     followers.starts_within(values, scale)
-    error = messages.wrong * scale
-    followers.need_outweighed(values, Fraction(1), error, walk.push, "the start of agent {} may grow")
+    push = Fraction(0) if messages.leaders is None else messages.leaders.push * scale / messages.least_gain()
+    why = "the start of agent {} may grow"
+    followers.need_outweighed(values, Fraction(1), messages.wrong * scale, push, why)
+    walk = Walk(messages, graph, followers.nodes, instants, values, scale, kind)
     followed = [own for own in (one.along(walk) for one in stated) if own is not None]
     for i, step in enumerate(walk):
         for own in followed:

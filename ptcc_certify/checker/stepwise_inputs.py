@@ -18,6 +18,7 @@ from fractions import Fraction
 from itertools import pairwise
 from math import ceil
 
+from lmi.exact.numbers import longest
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.input_formulas import Limits, clock_between
@@ -51,8 +52,6 @@ class Walk:
         What acts at every instant; ascending to the cap, at ``T`` as before without one.
     ways : sequence of Fraction
         How far its clock goes between two of them, from below; without a cap None to ``T``.
-    push : Fraction
-        What pushes followers at first, over the first gain, times the scale.
     """
 
     def __init__(
@@ -71,9 +70,9 @@ class Walk:
         gains = [Limits(cap).gain_at(gain, t) for t in instants[:-1]]
         self.gain, self.gains = gain, [*gains, cap or gains[-1]]
         self.ways = [clock_between(gain, cap, a, b) for a, b in pairwise(instants)]
-        self.push = Fraction(0) if leaders is None else leaders.push * scale / gains[0]
+        push = Fraction(0) if leaders is None else leaders.push * scale / gains[0]
         degrees = [graph.diagonal[v] for v in nodes]
-        self.steps = kind(graph, nodes, degrees, start, messages.wrong * scale, messages.parts, self.push)
+        self.steps = kind(graph, nodes, degrees, start, messages.wrong * scale, messages.parts, push)
         self.unit = Fraction(self.steps.largest, scale << FIXED)
         self._told = instants, messages.delay, self.ways, gains if leaders is not None else []
 
@@ -130,7 +129,8 @@ class VehicleSteps:
 
     def __init__(self, walk: Walk, begun: Sequence[Fraction], a1: Fraction, a2: Fraction):
         self.walk, self.a1, gains, ways = walk, a1, walk.gains, [way or Fraction(0) for way in walk.ways]
-        spend(len(ways) * (40 + 12 * len(begun)), 2 * FIXED, FIXED, "vehicles from instant to instant")
+        bits = length((a1, a2)) + FIXED
+        spend(60 * len(ways), bits, length((gains[0], gains[-1])), "vehicles from instant to instant")
         size = walk.size * gains[0]
         self._begun = [ceil(v / (size * D)) for v, D in zip(begun, walk.steps.degrees, strict=True)]
         self.lag, self.most, self.velocity, self.input = ([0] * len(begun) for _ in range(4))
@@ -144,6 +144,8 @@ class VehicleSteps:
             of_both = high / top, (rise + high**2) / top**2, high**2 / top**2
             self._factors.append([ceil(ONE * x) for x in (*of_begun, *of_both)])
             clock += way
+        bits = longest(x for factors in self._factors for x in factors)
+        spend(8 * len(ways) * len(begun), bits, longest(self._begun) + FIXED, "vehicles from instant to instant")
 
     def step(self, i: int, step: Step) -> None:
         """Take a step of the walk."""

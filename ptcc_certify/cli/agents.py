@@ -168,9 +168,14 @@ def refuse_agents_of_family(options: Options, verb: str) -> None:
     agents = agents_of(options)
     if agents is None or (verb == "certify" and agents.virtual):
         return
-    if agents.of_paper and agents.biases is None:
-        return  # in a formation
-    flags = agents_flags(options)
+    if agents.of_paper and options["biases"] is None:  # in a formation
+        if (options["dimension"] or 1) > 1:
+            why = "a formation of a family is on a line; what is proved of one coordinate holds for each"
+            raise ParameterError(f"--dimension: {why}: leave it out, and give one coordinate")
+        return
+    if agents.of_paper:
+        raise ParameterError("--biases: of a family make other places in every graph; give --offsets instead")
+    flags = agents_flags({**options, "offsets": None})
     verbs = ("is", "it") if " and " not in flags else ("are", "them")
     mend = f"leave {verbs[1]} out, or {verb} one graph"
     if verb == "certify" and _may_exchange(options):
@@ -180,7 +185,7 @@ def refuse_agents_of_family(options: Options, verb: str) -> None:
 
 def _may_exchange(options: Options) -> bool:
     """Tell whether agents are double integrators that could exchange virtual positions, of which more is proved."""
-    plain = all(options[name] is None for name in _OWN if name != "v0")
+    plain = all(options[name] is None for name in _OWN if name not in ("v0", "offsets"))
     plain = plain and not options.get("own_delay") and options.get("kind") == "nominal"
     return options["agents"] == "double-integrator" and plain
 

@@ -32,7 +32,12 @@ TITLE = "Robust prescribed-time coordination control of cooperative-antagonistic
 
 #: What facts are of, in words, by their heads.
 HEADS = {"nodes": "Their names", "read": "Read as", "family": "Family of graphs", "given": "Assumed"}
-HEADS |= {"x(0)": "Initial state", "v(0)": "Initial velocities", "sigma(0)": "Sliding variables sigma(0)"}
+HEADS |= {
+    "x(0)": "Initial state",
+    "offsets": "Places",
+    "v(0)": "Initial velocities",
+    "sigma(0)": "Sliding variables sigma(0)",
+}
 HEADS |= {"alone": "Each mode alone", "groups": "What holds all the same", "box": "Where they are drawn"}
 HEADS |= {"rate": "How fast", "error": "How near", "bound": "Upper bound", "function": "Lyapunov functions"}
 HEADS |= {"x(T)": "Where they end", "v(T)": "Velocities at T", "a(T)": "Accelerations at T", "x(t)": "Where they stay"}

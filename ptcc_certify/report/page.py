@@ -53,7 +53,7 @@ from ptcc_certify.theorems.table import THEOREMS
 #: Weights of a member that are listed.
 _WEIGHTS = 8
 #: Facts of the question, and those that stand elsewhere on the page.
-_QUESTION = ["graph", "family", "read", "nodes", "mode", "structure", "protocol", "x(0)", "v(0)", "sigma(0)"]
+_QUESTION = ["graph", "family", "read", "nodes", "mode", "structure", "protocol", "x(0)", "offsets", "v(0)", "sigma(0)"]
 _ELSEWHERE = ("verdict", "proof")
 #: The theorem of families, as page and statement give it.
 THEOREM = (

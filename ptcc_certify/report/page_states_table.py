@@ -47,7 +47,7 @@ def states_table(saved: Certificate) -> tuple[str, list[Any], list[str]]:
 
 def _assumed(saved: Certificate) -> str:
     """Tell what final states are without, where more was asked."""
-    return "".join(f", {text}" for text in assumptions(saved))
+    return "".join(f", {text}" for text in assumptions(saved, states=True))
 
 
 def _tabled(saved: Certificate) -> list[int]:

@@ -135,6 +135,7 @@ def _of_graph(saved: Certificate) -> dict[str, Any]:
         **{
             "claims_in_all": len(proof.claims),
             "assumed": assumptions(saved),
+            "assumed_of_states": assumptions(saved, states=True),
             "offsets": proof.offsets,
         },
         "plant": "" if proof.agents is None else plant_text(proof.agents.protocol.plant),
@@ -160,6 +161,7 @@ def _of_family(saved: Certificate) -> dict[str, Any]:
         **{
             "claims_in_all": len(components),
             "assumed": assumptions(saved),
+            "assumed_of_states": assumptions(saved, states=True),
             "offsets": proof.offsets,
             "plant": "",
             "bounds": [],

@@ -138,7 +138,7 @@ class AgentsMotion(Motion):
     """
 
     def __init__(self, graph: SignedDigraph, state: np.ndarray, rtol: float):
-        largest = max(float(np.abs(state).max(initial=0)), 1e-300)
+        largest = float(np.abs(state).max(initial=0)) or 1.0
         super().__init__(Members(graph), state, Tolerances(rtol, rtol * largest))
         self._options |= {"max_num_steps": 200_000}
 

@@ -27,6 +27,7 @@ from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.report.facts.of_certificate import facts_of
 from ptcc_certify.report.plots.runs_under_signals import sample_runs
 from ptcc_certify.report.plots.trajectory import plot_trajectory
 from ptcc_certify.report.screen import summary_lines
@@ -198,6 +199,13 @@ def test_places_of_a_family_that_do_not_follow_are_rejected(change: Any, reason:
 def test_what_is_not_proved_of_families_is_refused(protocol: Any, agents: Any, x0: Any, words: str):
     with pytest.raises(ParameterError, match=words):
         certify(UNSURE, protocol, x0, agents=Agents(**agents))
+
+
+def test_vehicles_are_told_to_end_where_virtual_positions_do_with_their_places() -> None:
+    ours, _ = pair(TEAM, NOMINAL, [5, 2, 4, -1], PLACES, 2, asks=Asks(simulation=False, method="paper"))
+    assert "of virtual positions, places added" in told(ours) and "track them, places added" in told(ours)
+    ((fact,),) = ([one for one in facts_of(each) if one.head == "offsets"] for each in (ours,))
+    assert list(fact.value.values()) == PLACES and fact.detail
 
 
 def test_a_cap_of_the_agents_of_a_family_is_that_of_its_limits_and_messages():

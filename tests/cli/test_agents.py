@@ -367,3 +367,34 @@ def test_coordinates_may_take_more_letters_than_the_name_of_a_file(tmp_path: Pat
     state = ",".join(["-1/3"] * 202)
     made = ptcc("certify", str(path), "--agents", "2", "--dimension", "2", "--x0", state, "--no-simulation", "-q")
     assert made.code in (0, 4) and not made.err
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (("certify", "--biases", "0,0,0,0,0,0"), "--biases: of a family make other places in every graph"),
+        (("simulate", "--biases", "0,0,0,0,0,0"), "--biases: of a family make other places in every graph"),
+        (("certify", "--dimension", "2"), "--dimension: a formation of a family is on a line"),
+        (("plot", "--what", "states", "--dimension", "2"), "--dimension: a formation of a family is on a line"),
+        (("certify", "--agents", "double-integrator"), "--agents: is not for families of graphs yet"),
+        (("simulate", "--agents", "2", "--exchange", "virtual"), "--agents and --exchange: are not for families"),
+    ],
+)
+def test_of_formations_of_families_what_is_not_proved_is_refused_by_what_it_is(
+    words: tuple[str, ...], why: str, tmp_path: Path
+):
+    command, *options = words
+    options += ["-o", str(tmp_path / "out.png")] if command == "plot" else []
+    asked = ptcc(command, "fig1b", "--uncertainty", "10%", "--offsets", "1,2,3,4,5,6", "--x0", "1,2,3,4,5,6", *options)
+    assert asked.code == 2 and why in asked.err
+
+
+def test_runs_of_a_family_and_of_vehicles_in_a_formation_are_of_positions(tmp_path: Path):
+    team = tmp_path / "team.csv"
+    team.write_text("1,2,1\n2,3,-1\n")
+    asked = ("simulate", str(team), "--offsets", "1,2,3", "--x0", "1,2,3", "--rho2", "9")
+    for more in (("--uncertainty", "10%"), ("--agents", "double-integrator", "--exchange", "virtual")):
+        run = ptcc(*asked, *more)
+        first, *_, last = list(csv.DictReader(io.StringIO(run.out)))
+        for k in range(1, 4):  # less their places all begin at 0, where they stay
+            assert float(first[str(k)]) == float(last[str(k)]) == k

@@ -51,12 +51,13 @@ def without_flaws(messages: LateMessages | None) -> str:
     return f"nothing {' or '.join(messages.flaws if messages is not None else ())}"
 
 
-def assumptions(certificate: Certificate) -> list[str]:
-    """Tell what claim, final state, rate and error are without, where more was asked."""
+def assumptions(certificate: Certificate, states: bool = False) -> list[str]:
+    """Tell what claim, rate and error are without, where more was asked; or final ``states``, with their places."""
     messages, leaders, limits = asked_messages(certificate), certificate.proof.asked_leaders, bool(certificate.limits)
     virtual = messages is not None and messages.vehicles is not None
+    placed = states and certificate.proof.offsets is not None
     assumed = {
-        "of virtual positions": virtual,
+        "of virtual positions, places added" if placed else "of virtual positions": virtual,
         "without a gain cap": not limits and messages is not None and messages.gain_cap is not None,
         without_flaws(messages): messages is not None and not messages.exact,
         "leaders at rest": leaders is not None and leaders.speed > 0,

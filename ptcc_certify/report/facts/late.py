@@ -37,7 +37,7 @@ def late_facts(certificate: Certificate) -> Facts:
     if late.tracks and late.leaders is not None:
         yield from _tracking(late, late.leaders, certificate.at)
         return
-    yield from _vehicles(late)
+    yield from _vehicles(certificate, late)
     yield Fact(head="messages", note=messages_text(late.messages, certificate.protocol))
     if late.leaders is not None:
         yield Fact(head="leaders", note=leaders_text(late.leaders))
@@ -78,7 +78,7 @@ def _bound_text(late: LateBounds, bound: float, digits: int) -> str:
     return up(bound, digits) if bound or late.largest_bound([0.0]).any() else "0"
 
 
-def _vehicles(late: LateBounds) -> Facts:
+def _vehicles(certificate: Certificate, late: LateBounds) -> Facts:
     """Tell what vehicles do that exchange virtual positions, and what is proved of their motion before ``T``."""
     if late.messages.vehicles is None:
         return
@@ -86,8 +86,9 @@ def _vehicles(late: LateBounds) -> Facts:
     if (proved := late.vehicles) is None:
         yield Fact(head="agents", note=text)
         return
+    places = "" if certificate.proof.offsets is None else ", places added"
     gains = "a_1 = a_2" if proved.a1 == proved.a2 else f"a_1 = {near(proved.a1)}, a_2"
-    yield Fact(head="agents", note=f"{text}, and track them: {gains} = {near(proved.a2)}")
+    yield Fact(head="agents", note=f"{text}, and track them{places}: {gains} = {near(proved.a2)}")
     shares, percent = (0.5, 0.9, 0.99), np.arange(1, 100)  # drives are summed up from instant to instant
     over_time = late.vehicles_over_time(float(late.gain.gain.T) * percent / 100)
     position, velocity = (bounds[:, np.isin(percent, (50, 90, 99))] for bounds in over_time)

@@ -43,6 +43,9 @@ def initial_facts(certificate: Certificate, origins: Mapping[str, str], alone: b
         text = value_list(certificate.labels, begin) + drawn
         text += ", of the simulated run alone" if alone else ""
         yield Fact(head="x(0)", value=dict(zip(certificate.labels, begin, strict=True)), note=text, detail=True)
+    if (places := certificate.proof.offsets) is not None:
+        values = dict(zip(certificate.labels, places, strict=True))
+        yield Fact(head="offsets", value=values, note=value_list(certificate.labels, places), detail=True)
     if (v0 := certificate.proof.velocities) is not None and any(v0):
         values = dict(zip(certificate.labels, v0, strict=True))
         yield Fact(head="v(0)", value=values, note=value_list(certificate.labels, v0), detail=True)
@@ -55,7 +58,7 @@ def final_facts(certificate: Certificate) -> Facts:
         return
     remarks = {
         _meeting(certificate): bool(result.degenerate),
-        **dict.fromkeys(assumptions(certificate), True),
+        **dict.fromkeys(assumptions(certificate, states=True), True),
         "not certified that they get there": certificate.verdict == "undecided",
     }
     more = "".join(f"; {remark}" for remark, holds in remarks.items() if holds) + ")"
@@ -122,7 +125,7 @@ def family_final_facts(certificate: Certificate) -> Facts:
         ends, more = states_of_signal(certificate.family_proof), f"{agreement_text(certificate)} (these signals)"
         head = "x(T)" if rests(certificate) else "x(t)"
     if ends is not None:
-        assumed = f" ({', '.join(without)})" if (without := assumptions(certificate)) else ""
+        assumed = f" ({', '.join(without)})" if (without := assumptions(certificate, states=True)) else ""
         note, brief = (f"{intervals_text(labels, ends, width)}{more}{assumed}" for width in (_LONG, _SHORT))
         yield Fact(head=head, value=dict(zip(labels, ends, strict=True)), note=note, brief=(brief,))
     if text := constant_text(certificate):
