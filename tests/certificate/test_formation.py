@@ -82,7 +82,7 @@ def agree(ours: Certificate, plain: Certificate, folder: Path) -> None:
         assert one == (None if less is None else (less[0] + h, less[1] + h))
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(2)
 @pytest.mark.parametrize("seed", range(4 * len(KINDS)))
 def test_a_formation_of_a_family_has_the_certificate_of_its_states_less_places(seed: int, tmp_path: Path):
     rng = random.Random(seed)

@@ -28,6 +28,8 @@ from ptcc_certify.lyapunov.follower_rows import FollowerRows
 
 #: Instants at most, and products of weights that all instants together may take.
 MOST_INSTANTS, MOST_PRODUCTS = 2000, 20_000_000
+#: The same where vehicles follow, in integers without arrays.
+_OF_VEHICLES = 1_000_000
 #: Instants in one delay, at most, and in each e-fold of the time that is left.
 _IN_DELAY, _IN_E_FOLD = 32, 120
 #: Where nothing is late, in place of a delay, how far the clock goes times the largest degree.
@@ -117,7 +119,8 @@ def search_steps(case: LateCase, rows: FollowerRows, first: np.ndarray) -> Steps
     NoCertificate
         No vector for the followers was found.
     """
-    most = min(MOST_INSTANTS, MOST_PRODUCTS // (rows.W.nnz + 4 * rows.D.size))
+    products = MOST_PRODUCTS if case.messages.vehicles is None else _OF_VEHICLES
+    most = min(MOST_INSTANTS, products // (rows.W.nnz + 4 * rows.D.size))
     if most < _FEWEST:
         return None
     start = _start(rows, _wrong(case) + _lags(case, rows, (Fraction(0),))[0], first)
