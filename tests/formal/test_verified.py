@@ -357,7 +357,7 @@ def test_no_mutant_of_the_claims_of_many_weak_components_is_accepted(tmp_path: P
     of_components = ((path, mutant) for path, mutant in mutants(document) if path[:1] == ("components",))
     count = 0
     for path, mutant in islice(of_components, 0, None, 3):
-        if mutant["components"] != document["components"]:
+        if mutant.get("components") != document["components"]:
             count += 1
             assert said(resealed(mutant), tmp_path).code == 1, path
     assert count >= 500
@@ -742,8 +742,13 @@ def test_of_mutants_of_a_box_of_initial_states_none_is_accepted_unless_true_or_n
     document = {**of_box("narrow", NominalProtocol(2, 3, 1, 2)), "unverified": {}}
     found = [pair for pair in mutants(document, every=1) if about_efforts(document, pair[0])]
     assert len(found) > 100
+
+    def without_a_set(_: Any, path: Any, place: str, left: set[str]) -> bool:
+        """Whether the box is gone, and so are the peaks of it: these are named as not checked."""
+        return path == ("input", "initial_set") and place == "input.initial_set" and "input.peak" in left
+
     for path, mutant in found[::every]:
-        compare(mutant, path, tmp_path)
+        compare(mutant, path, tmp_path, more=without_a_set)
 
 
 @pytest.mark.few(0)
