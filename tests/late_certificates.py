@@ -428,10 +428,12 @@ class Late:
             for row in Q
         ]
         deviation = [number(function["deviation"]["agents"][label]) for label in self.labels]
-        rest = [(m + sqrt(c)[1] * root * left) * (1 + ROOM) for m, c in zip(moved, deviation, strict=True)]
+        away = [sqrt(c)[1] * root * (1 + ROOM) for c in deviation]
+        rest = [(m + x * left) * (1 + ROOM) for m, x in zip(moved, away, strict=True)]
         told = {"q": text(q), "b": text(b), "kap": text(kap)}
         y = root * self.largest_gain(b, gain_cap, None) * (1 + ROOM)
-        said = {"left": text(left), "moved": self.by_agent(moved), "residual": self.by_agent(rest)}
+        agents = {"moved": moved, "away": away, "residual": rest}
+        said = {"left": text(left), **{key: self.by_agent(values) for key, values in agents.items()}}
         witness = {"function": k, "phi": self.by_agent(phi)}
         return said, {"numbers": told, "witness": witness, "inputs": [x * y for x in phi]}
 

@@ -494,14 +494,16 @@ class LateOracle(Oracle):
 
     def small_delays(self) -> None:
         said = self.said["form"]
-        self.require(self.cap is not None and self.error == 0 and self.target is not None, "form: what it needs")
-        if self.false or self.cap is None:
+        capped = self.cap is not None or not (self.delay or self.error)
+        self.require(capped and self.target is not None, "form: what it needs")
+        self.require(not self.error or self.said["own"] == "fresh", "form: a late own state that is off")
+        if self.false:
             return
         step = self.witness("messages.form")
         q, b, kap = (number(step["numbers"][key]) for key in ("q", "b", "kap"))
         k, phi = step["witness"]["function"], self.vector(step["witness"]["phi"])
         function, (F, P, _, nodes) = self.data["decays"][k], self.forms[k]
-        r, h = number(function["rate"]), self.cap * self.delay
+        r, h = number(function["rate"]), (self.cap or 0) * self.delay
         self.require(function["coordinates"] == "E" and b > 0 and not ball(q) < ball(b * h).exp(), "form: q")
         inverse = np.array([[float(x) for x in row] for row in P])
         constants = dict(zip(nodes, np.diag(np.linalg.inv(inverse)).tolist(), strict=True))
@@ -514,24 +516,45 @@ class LateOracle(Oracle):
         # |L'P L| = |F|
         value = sum((abs(F[i][j]) * pushed[i] * pushed[j] for i in range(self.n) for j in range(self.n)), Fraction(0))
         self.require(kap >= 0 and kap**2 >= value and b + h * q * kap <= r / 2, "form: kap")
+        floor = Fraction(0)
+        self.require(("floor" in said) == ("psi" in step["witness"]) == (self.error > 0), "form: floor and psi")
+        if self.error and not self.false:
+            floor, psi = number(said["floor"]), self.vector(step["witness"]["psi"])
+            off = [
+                sum((h * abs(x) * psi[j] + self.error * abs(x) for j, x in enumerate(row) if j != i), Fraction(0))
+                for i, row in enumerate(self.L)
+            ]
+            for v in range(self.n):
+                least = math.sqrt(constants.get(v, 0.0)) * (1 - 1e-9) * float(floor) + float(off[v])
+                self.require(float(psi[v]) >= least * (1 - 1e-12), f"form: psi of {v}")
+            value = sum((abs(F[i][j]) * off[i] * off[j] for i in range(self.n) for j in range(self.n)), Fraction(0))
+            self.require(floor >= 0 and (floor * r / 2) ** 2 >= value, "form: floor")
+        if self.cap is None:
+            self.require(number(said["left"]) == 0, "form: left")
+            return
         self.require(not ball(number(said["left"])) < (-ball(b) * self.clock(self.cap)).exp(), "form: left")
-        self.decays_along_motions("form", np.array([[float(x) for x in row] for row in F]), float(b))
+        self.decays_along_motions("form", np.array([[float(x) for x in row] for row in F]), float(b), float(floor))
 
-    def decays_along_motions(self, name: str, A: np.ndarray, b: float) -> None:
-        """Motions beside ``x'A x``, its rate ``2 b``, and how far agents are drawn away."""
+    def decays_along_motions(self, name: str, A: np.ndarray, b: float, floor: float = 0.0) -> None:
+        """Motions beside ``x'A x``, its rate ``2 b`` and what errors add, and how far agents are drawn away."""
         said, T = self.said[name], float(self.gain[0])
-        moved, residual = (np.array(list(map(float, self.vector(said[key])))) for key in ("moved", "residual"))
+        keys = "moved", "away", "residual"
+        moved, away, residual = (np.array(list(map(float, self.vector(said[key])))) for key in keys)
         Q = np.array([[float(x) for x in row] for row in self.Q])
         for runs, target in self.loop(1.2 * T):
             for X in runs.states:
                 V = np.sqrt(np.maximum(np.einsum("it,ij,jt->t", X, A, X), 0))
                 z = np.array([math.exp(-b * runs.gain.clock(min(t, T))) for t in runs.times])
                 ok = runs.times <= T
-                self.require(not np.any((V[0] * z * (1 + 1e-6) + FLOOR < V)[ok]), f"{name}: a motion")
-                off = np.abs(Q @ (X - X[:, :1]))
+                self.require(not np.any(((V[0] * z + floor) * (1 + 1e-6) + FLOOR < V)[ok]), f"{name}: a motion")
+                off = np.abs(Q @ (X - X[:, :1]))[:, ok if self.error else ...]
                 self.require(not np.any(off > moved[:, None] * (1 + 1e-6) + FLOOR), f"{name}: moved")
                 end = np.abs(X[:, runs.times == T] - target[:, None])
                 self.require(not np.any(end > residual[:, None] * (1 + 1e-6) + FLOOR), f"{name}: residual")
+        for runs, target in self.loop():
+            z = np.array([math.exp(-b * runs.gain.clock(t)) for t in runs.times])
+            most = (moved[:, None] + away[:, None] * z) * (1 + 1e-6) + FLOOR
+            self.require(not np.any(runs.away(target) > most), f"{name}: away")
 
     def delay_lmi(self) -> None:
         """Motions, and the inequality with a column for every late edge, by eigenvalues."""
@@ -565,11 +588,6 @@ class LateOracle(Oracle):
         size = np.sqrt(np.abs(np.diag(N)) + 1e-300)
         self.require(np.linalg.eigvalsh(N / np.outer(size, size))[0] > -1e-7, "lmi: the inequality")
         self.decays_along_motions("lmi", C.T @ P @ C, float(b))
-        moved, away = (np.array(list(map(float, self.vector(said[key]))))[:, None] for key in ("moved", "away"))
-        for runs, target in self.loop():
-            z = np.array([math.exp(-float(b) * runs.gain.clock(t)) for t in runs.times])
-            most = (moved + away * z) * (1 + 1e-6) + FLOOR
-            self.require(not np.any(runs.away(target) > most), "lmi: away")
 
     def behind_settling_leaders(self) -> None:
         said, step = self.said["settling"], self.witness("messages.settling")

@@ -1,9 +1,9 @@
-"""What holds of double integrators that track virtual states: every decay of these by rows carries over.
+"""What holds of double integrators that track virtual states: every decay of these carries over.
 
-With ``|z_k - x*_k| <= u_k (M y + C + floor)``, ``y' >= -b g y`` and ``C' >= -b g C`` where nothing drives it, ``g`` the
-gain of the chain, ``a_1 > b`` and ``a_2 >= b``
+With ``|z_k - x*_k| <= Y_k + floor_k``, ``Y_k = away_k y``, by rows ``u_k (M y + C)``, ``y' >= -b g y`` and ``C' >= -b g
+C`` where nothing drives it, ``g`` the gain of the chain, ``a_1 > b`` and ``a_2 >= b``
 
-    |x_k - x*_k| <= u_k (a_1 (M y + C)/(a_1 - b) + floor) + |v_k(0)| y/((a_1 - b) g(0))
+    |x_k - x*_k| <= a_1 Y_k/(a_1 - b) + floor_k + |v_k(0)| y/((a_1 - b) g(0))
     |v_k| <= a_1 g (|x_k - x*_k| + |z_k + r_k/(a_1 g) - x*_k|),   |r_k| <= |v_k(0)| g y/g(0).
 
 Floors are not drives: they are added as they are. ``v_k(0)`` has a term of its own, which is there where ``M = 0``.
@@ -14,18 +14,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_up, up
 from ptcc_certify.bounds.agents.each_agent import checked_graph
-from ptcc_certify.bounds.delay.case import LateCase
+from ptcc_certify.bounds.delay.case import LateCase, Moments
 from ptcc_certify.bounds.delay.decay_by_rows import RowBound
 from ptcc_certify.bounds.delay.decay_by_steps import Steps
 from ptcc_certify.bounds.float_conversion import floats_up
+from ptcc_certify.checker.message_ages import Messages
 from ptcc_certify.checker.side_files import Numbers
-from ptcc_certify.checker.stated_bounds import Decay, VehiclesSection, coefficients
+from ptcc_certify.checker.stated_bounds import DecayOfAll, VehiclesSection, passed_on
 from ptcc_certify.checker.stepwise_inputs import VehicleSteps, Walk
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
@@ -36,6 +37,13 @@ from ptcc_certify.lyapunov.follower_rows import FollowerRows
 FASTER = 2
 #: What is added to a bound in floats, relatively and absolutely, so that it holds.
 _MORE, _LEAST = 1 + 1e-9, 1e-300
+
+
+class Carried(Protocol):
+    """A decay of virtual states, by rows or of all agents."""
+
+    def over_time(self, case: LateCase, t: np.ndarray) -> Moments:
+        """Return what bounds ``|z_k - x_k*|`` of all agents at instants."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +70,7 @@ class VehicleBounds:
     velocity: np.ndarray | None
     input: np.ndarray | None
 
-    def over_time(self, case: LateCase, rows: Sequence[RowBound], t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def over_time(self, case: LateCase, decays: Sequence[Carried], t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return what bounds deviations and velocities of all agents at instants, ``(N, M)`` floats.
 
         From ``T`` on the gain of the tracking stays what it came to: without a cap there is no bound after ``T``. With
@@ -73,14 +81,13 @@ class VehicleBounds:
         g = case.limited().value(t, remaining=np.maximum(1 - t / T, _LEAST))
         first = float(case.exact.least_gain())
         position, velocity = (np.full((speed.size, len(t)), np.inf) for _ in range(2))
-        for row in filter(self._tracks, rows):
-            (y, added), b = row.decay(case, t), float(row.witness.b)
-            u, lag, floor = np.zeros((speed.size, 1)), 1 / (a1 - b), float(row.floor)
-            u[chosen, 0] = row.witness.u
-            decaying = float(row.initial) * y + added
-            own = u * (a1 * lag * decaying + floor) + speed * lag / first * y
-            ahead = u * (decaying + floor) + speed / (a1 * first) * y
-            least = np.where((u + speed > 0) & (decaying + floor > 0), _LEAST, 0.0)
+        for b, y, decaying, floor in (one.over_time(case, t) for one in decays):
+            if not (b < a1 and b <= float(self.a2)):
+                continue
+            lag = 1 / (a1 - b)
+            own = a1 * lag * decaying + floor + speed * lag / first * y
+            ahead = decaying + floor + speed / (a1 * first) * y
+            least = np.where(decaying + floor > 0, _LEAST, 0.0)
             position = np.minimum(position, own * _MORE + least)
             velocity = np.minimum(velocity, a1 * g * (own + ahead) * _MORE + least)
         past = t > T
@@ -89,6 +96,7 @@ class VehicleBounds:
         else:
             velocity = np.where(past, np.inf, np.minimum(velocity, self.velocity[:, None]))
         if cap is None or case.leaders is not None:
+            rows = [one for one in decays if isinstance(one, RowBound)]
             position[:, past] = np.inf if (after := self.after(case, rows)) is None else after
         if case.leaders is not None:  # which move as they like
             others = np.setdiff1d(np.arange(speed.size), chosen)
@@ -105,18 +113,15 @@ class VehicleBounds:
         cap, leaders = case.messages.gain_cap, case.leaders
         if cap is None or leaders is None:
             return None
-        messages, at_T = case.exact, self.position
+        messages, at_T, speed = case.exact, self.position, [abs(x) for x in self.v0]
         early, lasting = (float_up(leaders.speed / (self.a1 * g)) for g in (messages.least_gain(), cap))
         found = []
-        for row in filter(self._tracks, rows):
-            decay = _decay(case, replace(row, floor=row.floor + (row.after or 0)), None)
-            bound = _meet(case, row, coefficients(messages, decay, self.a1, self.a2)[0], self.v0)
-            found += [(bound + early).max(), np.maximum(bound + lasting, at_T).max()]
+        for row in rows:
+            if row.witness.b < self.a1 and row.witness.b <= self.a2:
+                decay = _of_row(case, replace(row, floor=row.floor + (row.after or 0), drift=None))
+                bound = _passed(messages, decay, (self.a1, self.a2), speed)[0]
+                found += [(bound + early).max(), np.maximum(bound + lasting, at_T).max()]
         return float(min(found)) * _MORE
-
-    def _tracks(self, row: RowBound) -> bool:
-        """Tell whether vehicles track faster than virtual positions decay."""
-        return row.witness.b < self.a1 and row.witness.b <= self.a2
 
 
 def bound_vehicles(
@@ -158,17 +163,67 @@ def bound_vehicles(
 
 def _by_rows(case: LateCase, found: Sequence[RowBound], rows: FollowerRows) -> VehicleBounds:
     """Return what holds of vehicles by rows of virtual states."""
+    decays = [_of_row(case, row, rows) for row in found]
+    return _bounds(case, decays)
+
+
+def vehicles_of_all(case: LateCase, decays: Sequence[DecayOfAll]) -> VehicleBounds:
+    """Return what holds of vehicles by decays of all virtual states."""
+    floats = []
+    for one in decays:
+        columns = [x * one.left for x in one.away], one.floor, one.falling, one.standing
+        each = (case.of_nodes(one.nodes, np.array([float_up(x) for x in column])) for column in columns)
+        floats.append(_Ends(one.b, one.left, one.cap, *each))
+    return _bounds(case, floats)
+
+
+class _Ends(NamedTuple):
+    """A decay of virtual states, by agent in floats: what it leaves at ``T``, what stands, and both of ``|e_k|``."""
+
+    b: Fraction
+    left: Fraction
+    cap: Fraction | None
+    at_T: np.ndarray
+    floor: np.ndarray
+    falling: np.ndarray | float = 0.0
+    standing: np.ndarray | float = 0.0
+
+
+def _of_row(case: LateCase, row: RowBound, rows: FollowerRows | None = None) -> _Ends:
+    """Return the decay of a row of virtual states; without rows of a graph nothing of ``|e_k|``."""
+    u, b = np.zeros(len(case.of.labels)), row.witness.b
+    u[case.followers] = row.witness.u
+    M, at_T, floor = (float_up(x) for x in (row.initial, row.initial * row.left + (row.drift or 0), row.floor))
+    if rows is None:
+        return _Ends(b, row.left, row.cap, u * at_T, u * floor)
+    falling, standing = np.zeros((2, u.size))
+    falling[case.followers] = (2 * rows.weights - float(b) * (1 - 1e-15)) * row.witness.u * M
+    most, error = float_up(row.highest_floor(case)), float_up(case.exact.wrong)
+    standing[case.followers] = most * rows.largest(row.witness.u) + error * rows.weights
+    return _Ends(b, row.left, row.cap, u * at_T, u * floor, falling, standing)
+
+
+def _bounds(case: LateCase, decays: Sequence[_Ends]) -> VehicleBounds:
     vehicles = case.messages.vehicles
     assert vehicles is not None
-    a = Fraction(up(FASTER * max(row.witness.b for row in found), 3))
-    each = []
-    for row in found:
-        weights = rows.largest(row.witness.u), rows.weights
-        terms = coefficients(case.exact, _decay(case, row, row.drift), a, a)
-        each.append([_meet(case, row, one, vehicles.v0, *weights) for one in terms])
+    a = Fraction(up(FASTER * max(one.b for one in decays), 3))
+    each = [_passed(case.exact, one, (a, a), [abs(x) for x in vehicles.v0]) for one in decays]
     position, *capped = (np.minimum.reduce(bounds) for bounds in zip(*each, strict=True))
     velocity, push = capped or (None, None)
     return VehicleBounds(a, a, vehicles.v0, position, velocity, push)
+
+
+def _passed(
+    messages: Messages, decay: _Ends, gains: tuple[Fraction, Fraction], speed: Sequence[Fraction]
+) -> list[np.ndarray]:
+    """Return the bounds of all agents by one decay, in floats from above."""
+    pairs = [(decay.at_T, decay.floor), *[(decay.falling, decay.standing)] * 2]
+    begun, found = np.array([float_up(x) for x in speed]), []
+    for passed, (falls, stands) in zip(passed_on(messages, decay.b, decay.left, decay.cap, gains), pairs, strict=False):
+        by_begun, falling, standing = map(float_up, passed)
+        bound = by_begun * begun + falling * falls + standing * stands
+        found.append(np.asarray(bound * _MORE + np.where(bound > 0, _LEAST, 0)))
+    return found
 
 
 def _along(case: LateCase, steps: Steps, bounds: VehicleBounds) -> tuple[VehicleSteps, Sequence[int], np.ndarray]:
@@ -204,28 +259,6 @@ def _with_steps(case: LateCase, steps: Steps, bounds: VehicleBounds) -> VehicleB
         own = [float_up(factor * x) * _MORE for x in values]
         found[name][case.followers] = np.minimum(found[name][case.followers], own)
     return replace(bounds, **found)
-
-
-def _decay(case: LateCase, row: RowBound, drift: Fraction | None) -> Decay:
-    """Return the decay of a row; ``drift`` is what leaders that move add."""
-    highest = row.highest_floor(case)
-    return Decay(row.witness.b, row.cap, row.left, row.initial, row.floor, drift or Fraction(0), highest)
-
-
-def _meet(
-    case: LateCase,
-    row: RowBound,
-    terms: Sequence[Fraction],
-    v0: Sequence[Fraction],
-    pulled: np.ndarray | float = 0.0,
-    degrees: np.ndarray | float = 0.0,
-) -> np.ndarray:
-    """Return the bounds of all agents by the coefficients of one decay, in floats from above."""
-    by_velocity, by_u, by_pull, by_degree, by_error = (float_up(x) for x in terms)
-    bound = by_velocity * np.array([float(abs(x)) for x in v0]) * _MORE
-    u = row.witness.u
-    bound[case.followers] += u * by_u + (pulled * by_pull + degrees * u * by_degree + degrees * by_error) * _MORE
-    return np.asarray(bound * _MORE + np.where(bound > 0, _LEAST, 0))
 
 
 def vehicles_section(bounds: VehicleBounds | None) -> VehiclesSection | None:

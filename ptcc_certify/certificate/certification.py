@@ -44,7 +44,7 @@ from ptcc_certify.graphs.size_limits import (
     ONE_THREAD_NODES,
 )
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.lyapunov.follower_rows import refuse_other_targets
+from ptcc_certify.lyapunov.follower_rows import leading_group, refuse_other_targets
 from ptcc_certify.model import Protocol
 from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.asks import Asks
@@ -237,7 +237,14 @@ def _read_family(case: Case) -> Family:
     refuse_of_families(case)
     family = as_family(case.graph, uncertainty=case.uncertainty)
     if case.messages is not None or case.leaders is not None:
-        refuse_other_targets(family, "leaders that move" if case.messages is None else case.messages.asked)
+        asked, mend, messages = "leaders that move", "leave it out", case.messages
+        if messages is not None:
+            asked, late = messages.asked, messages.age > 0 and messages.gain_cap is None
+            if messages.at_rest and not late:
+                leading_group(family, asked)
+                return family
+            mend = "add a gain cap" if messages.at_rest else mend
+        refuse_other_targets(family, asked, mend)
     return family
 
 

@@ -164,7 +164,7 @@ class FamilyProof(Proof):
         With late messages what is left, while leaders move how they are tracked.
         """
         if self.late is not None:
-            return "graph" if not self.late.rows else "tracking" if self.late.tracks else "late"
+            return "graph" if not self.late.says_something else "tracking" if self.late.tracks else "late"
         nothing = self.initial_state is not None and not np.isfinite(self.deviation_bound([0.5])).any()
         return "states" if nothing else "decay"
 

@@ -255,7 +255,7 @@ def judge_messages(proof: GraphProof | FamilyProof) -> list[Answer]:
             answers.append(Answer(OPEN, "max_residual", "no messages are late"))
         return answers
     if not late.says_something and late.tracks:
-        told = Answer(OPEN, late.messages.asked_of_leaders, "no vector for the followers was found")
+        told = Answer(OPEN, late.messages.asked_of_leaders, late.missing)
         return [told, *_nothing_left(most)]
     if not late.says_something:
         limited = 0 < (late.longest_delay or 0) < math.inf

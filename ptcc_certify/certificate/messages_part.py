@@ -8,7 +8,12 @@ from fractions import Fraction
 
 from ptcc_certify.bounds.delay.case import LateCase
 from ptcc_certify.bounds.delay.late_messages import LateBounds, bound_late
-from ptcc_certify.bounds.delay.longest_delay import longest_delay, longest_forgiven, with_forms
+from ptcc_certify.bounds.delay.longest_delay import (
+    longest_delay,
+    longest_forgiven,
+    with_forms,
+    with_forms_of_family,
+)
 from ptcc_certify.certificate.assessment import rejects
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_proof import FamilyProof
@@ -33,10 +38,14 @@ def with_messages(certificate: Certificate) -> Certificate:
         return certificate
     case = LateCase(proof.question.subject, proof.protocol, messages, proof.initial_state, _ends(proof))
     late = bound_late(case)
-    if not isinstance(proof, GraphProof) or late.tracks or messages.vehicles is not None:
+    if isinstance(proof, FamilyProof) and case.led_by_groups:
+        late = with_forms_of_family(late, [(part.component, part.functions) for part in proof.parts])
+    if not isinstance(proof, GraphProof) or late.tracks or late.vehicles is not None:
         return certificate.changed(late=late)
     case = replace(late.case, influence=proof.influence, forms=proof.decaying_forms)
-    late = replace(with_forms(replace(late, case=case)), longest_delay=longest_forgiven(case))
+    late = with_forms(replace(late, case=case))
+    if messages.age:
+        late = replace(late, longest_delay=longest_forgiven(case))
     certificate, asked = certificate.changed(late=late), certificate.expectations.max_residual
     if asked is not None and messages.age and proof.graph.n_nodes <= EXACT_NODES:
         certificate = certificate.changed(late=replace(late, enough=_longest_delay(certificate, late, asked)))

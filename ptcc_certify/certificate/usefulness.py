@@ -241,8 +241,8 @@ def _use_of_late(late: LateBounds, longest_way: float | None) -> Use:
     way = 1.0 if late.relative else longest_way
     if way is not None and (vehicles := late.vehicles) is not None:  # the way on which they brake, beside that to go
         way += float(max(map(abs, vehicles.v0)) / (vehicles.a1 * late.case.exact.least_gain()))
-    where = "agent within {} of its final state" if late.leaders is None else "follower within {} of its target"
-    remark = f"every {where.format(up(late.largest, 2))} at T{' from within 1 of it' if late.relative else ''}"
+    relative = " from within 1 of it" if late.relative else ""
+    remark = f"every {late.whose} within {up(late.largest, 2)} of {late.goal} at T{relative}"
     return Use(way is not None and late.largest <= USEFUL * way, remark, caveat)
 
 
@@ -251,12 +251,12 @@ def _use_of_tracking(late: LateBounds) -> Use:
 
     That is what is proved at first, or how far the leaders may move by ``T`` if that is farther.
     """
-    if not late.rows or late.leaders is None:
+    if not late.says_something or late.leaders is None:
         return Use(None)
     T = float(late.case.protocol.T)
     first, last = (float(x) for x in late.largest_bound([0.0, 0.99 * T]))
     relative = " from within 1 of it" if late.relative else ""
-    remark = f"every follower within {up(last, 2)} of its {late.leaders.goal} at 0.99 T{relative}"
+    remark = f"every {late.whose} within {up(last, 2)} of {late.goal} at 0.99 T{relative}"
     useful = last <= max(USEFUL * max(first, float(late.leaders.total) * T), _NOTHING)
     if late.inputs is not None:
         return Use(useful, remark)

@@ -233,7 +233,7 @@ def _family_verdict(doc: Document, protocol: Protocol) -> str:
     check_family_bounds(doc, family, functions, protocol, begin, drive)
     check_boxes(doc, family, begin)
     check_restricted(doc, family, functions, protocol, begin)
-    check_messages(doc, family, protocol, begin)
+    check_messages(doc, family, protocol, begin, functions)
     return doc.close(True)
 
 

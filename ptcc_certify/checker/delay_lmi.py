@@ -38,7 +38,7 @@ from ptcc_certify.checker.matrix_products import Matrix, Sparse, need_rows, quad
 from ptcc_certify.checker.message_ages import PARTS, Messages
 from ptcc_certify.checker.reading import RejectedError, length, need
 from ptcc_certify.checker.section_declarations import FewAgents, Several, Triangle
-from ptcc_certify.checker.stated_bounds import Inputs
+from ptcc_certify.checker.stated_bounds import DecayOfAll
 
 Row = dict[int, Fraction]
 #: How often the bounds of ``|F_k|`` are put into themselves.
@@ -205,10 +205,8 @@ class LateLMIWitness:
     tau: Several[Fraction]
 
 
-def check_delay_lmi(
-    doc: Document, messages: Messages, verified: Verified, section: LateLMI, inputs: Inputs | None = None
-) -> None:
-    """Verify ``sqrt(V) <= e^(-b s) sqrt(V(0))`` under late messages, how far the final state may move, and inputs."""
+def check_delay_lmi(doc: Document, messages: Messages, verified: Verified, section: LateLMI) -> DecayOfAll:
+    """Verify ``sqrt(V) <= e^(-b s) sqrt(V(0))`` under late messages, and how far the final state may move."""
     doc.at = "messages.lmi"
     graph, cap, state = verified.structure.graph, messages.gain_cap, verified.begin.state
     if cap is None or state is None:
@@ -231,9 +229,9 @@ def check_delay_lmi(
     first = proved_above(graph, section.away, "away", [root * x for x in away])
     rest = [x + y * left for x, y in zip(moved, first, strict=True)]
     proved_above(graph, section.residual, "residual", rest)
-    if inputs is not None:
-        inputs.by_form(lmi.inputs(away, slope, walk), b, root)
     doc.done(f"b = {down(b)}, gain at most {down(cap)}")
+    falling = [root * x for x in lmi.inputs(away, slope, walk)]
+    return DecayOfAll(range(graph.n), b, None, left, list(first), list(moved), falling, [Fraction(0)] * graph.n)
 
 
 def loop_of(messages: Messages, verified: Verified, cap: Fraction) -> LateLoop:

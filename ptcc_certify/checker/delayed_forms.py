@@ -6,11 +6,11 @@ settle as they do without delays, and followers that hear of them late by rows.
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import chain
-from typing import Any
+from typing import Any, Protocol
 
 from lmi.exact.decimal_rounding import down
 from lmi.exact.elementary_enclosures import exp
@@ -19,20 +19,35 @@ from lmi.exact.work import spend
 from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.digraph import Digraph, edges_of
 from ptcc_certify.checker.document import Document
+from ptcc_certify.checker.family import Component, Family
 from ptcc_certify.checker.follower_rows import away_of
-from ptcc_certify.checker.graph import proved_above
+from ptcc_certify.checker.graph import positions, proved_above
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.lyapunov_form import Form
 from ptcc_certify.checker.matrix_products import quadratic
 from ptcc_certify.checker.message_ages import Messages, need_left
+from ptcc_certify.checker.protocol import Begin
 from ptcc_certify.checker.reading import RejectedError, length, need
-from ptcc_certify.checker.section_declarations import FewAgents, Positive
+from ptcc_certify.checker.section_declarations import FewAgents, Nodes, NotNegative, Positive
 from ptcc_certify.checker.side_files import Numbers
-from ptcc_certify.checker.stated_bounds import Inputs
+from ptcc_certify.checker.signal_bounds import Function, least
+from ptcc_certify.checker.stated_bounds import DecayOfAll
 from ptcc_certify.checker.structure import Structure
 
 #: Largest ``b gain_cap delay``; what is larger asks for a ``q`` that nothing allows.
 LARGEST_GROWTH = 1000
+
+
+#: Source, target, and the largest size of its weight.
+Edge = tuple[int, int, Fraction]
+
+
+class FunctionOfSignals(Function, Protocol):
+    """A Lyapunov function of a component of a family."""
+
+    @property
+    def component(self) -> Component:
+        """Whose it is."""
 
 
 @dataclass(frozen=True)
@@ -46,55 +61,158 @@ class Constants:
 
 @dataclass(frozen=True, kw_only=True)
 class LateForm:
-    """A Lyapunov function under small delays: the share that is left, how far ends move, and what is left."""
+    """A Lyapunov function under small delays and errors: what errors make of its root; the rest as of LMIs."""
 
     left: Fraction
+    floor: Fraction | None = None
     moved: FewAgents
+    away: FewAgents
     residual: FewAgents
 
 
 @dataclass(frozen=True, kw_only=True)
 class LateFormWitness:
-    """The number of the Lyapunov function, and ``phi`` of every agent."""
+    """The number of the Lyapunov function, ``phi`` of every agent, and where values are off ``psi``."""
 
     function: int
     phi: FewAgents
+    psi: FewAgents | None = None
 
 
-def check_form(
-    doc: Document, messages: Messages, verified: Verified, section: LateForm, inputs: Inputs | None = None
-) -> None:
-    """Verify ``sqrt(V) <= e^(-b s) sqrt(V(0))`` under late messages, how far the final state may move, and inputs."""
+def check_form(doc: Document, messages: Messages, verified: Verified, section: LateForm) -> DecayOfAll:
+    """Verify ``sqrt(V) <= e^(-b s) sqrt(V(0)) + floor``, and how far the final state may move."""
     doc.at = "messages.form"
-    graph, cap = verified.structure.graph, messages.gain_cap
-    if cap is None:
-        raise RejectedError("form without a cap of the gain")
-    need(messages.value_error == 0, "form of values that are off")
+    graph, cap, error = verified.structure.graph, messages.gain_cap, messages.value_error
+    need(cap is not None or not (messages.delay or error), "form without a cap, though something is late or off")
+    need(not (error and messages.late), "form of values that are off and of a late own state")
     obligation = doc.open("late-form", "messages.form")
     q, b, kap = (obligation[key] for key in ("q", "b", "kap"))
     known = function_of(doc, verified, obligation["witness"].function)
-    phi, left = obligation["witness"].phi, section.left
+    phi, psi, left = obligation["witness"].phi, obligation["witness"].psi, section.left
+    need(
+        (psi is None) == (not error) and (section.floor is None) == (not error),
+        "floor and psi are told iff values are off",
+    )
+    standing, floor = psi or Numbers([Fraction(0)] * graph.n), section.floor or Fraction(0)
     need(all(x >= 0 for x in phi), "phi is negative")
-    lag = cap * messages.delay * q
-    bits = length((b, kap, lag, left, known.form.rate, *phi, *known.errors, *known.deviations))
-    spend(20 * graph.n, bits, bits, "small delays")
+    need(floor >= 0 and all(x >= 0 for x in standing), "floor or psi is negative")
+    late = (cap or 0) * messages.delay
+    lag = late * q
+    bits = length((b, kap, lag, left, error, floor, known.form.rate, *phi, *standing, *known.errors, *known.deviations))
+    spend(30 * graph.n, bits, bits, "small delays")
     need(b > 0, "b is not positive")
-    growth = b * cap * messages.delay
-    need(growth <= LARGEST_GROWTH and q >= exp(growth)[1], "q is below e^(b h)")
+    need(b * late <= LARGEST_GROWTH and q >= exp(b * late)[1], "q is below e^(b h)")
     pushed = _heard(graph, phi, messages.late)
-    for label, x, c, y in zip(graph.labels, phi, known.errors, pushed, strict=True):
-        need(x >= formulas.root_above(c) + lag * y, f"phi of agent {shorten(label)} is too small")
+    off = [
+        late * x + error * Fraction(D, graph.unit)
+        for x, D in zip(_heard(graph, standing, False), graph.diagonal, strict=True)
+    ]
+    roots = [formulas.root_above(c) for c in known.errors]
+    for label, x, c, y in zip(graph.labels, phi, roots, pushed, strict=True):
+        need(x >= c + lag * y, f"phi of agent {shorten(label)} is too small")
+    for label, x, c, y in zip(graph.labels, standing, roots, off, strict=True):
+        need(x >= c * floor + y, f"psi of agent {shorten(label)} is too small")
     need(kap >= 0 and kap**2 >= _value_of_sizes(doc, graph, known.form, pushed), "kap is too small")
     need(b + lag * kap <= known.form.rate / 2, "the delay takes more than the rate")
-    need(left >= formulas.decay_above(b * formulas.Limits(cap).clock_below(messages.gain)), "left is not proved")
+    need((floor * known.form.rate / 2) ** 2 >= _value_of_sizes(doc, graph, known.form, off), "floor is too small")
+    far = need_left_at_deadline(messages, b, left)
     root = formulas.root_above(initial_value(verified, known.form))
-    moved = [lag / b * root * x for x in _moved(verified, pushed)]
-    claimed = proved_above(graph, section.moved, "moved", moved)
-    rest = [x + formulas.root_above(c) * root * left for x, c in zip(claimed, known.deviations, strict=True)]
-    proved_above(graph, section.residual, "residual", rest)
-    if inputs is not None:
-        inputs.by_form(list(phi), b, root)
-    doc.done(f"b = {down(b)}, gain at most {down(cap)}")
+    deviations = [formulas.root_above(c) for c in known.deviations]
+    walks = _moved(verified, [lag / b * root * x + far * y for x, y in zip(pushed, off, strict=True)])
+    moved = proved_above(graph, section.moved, "moved", [x + c * floor for x, c in zip(walks, deviations, strict=True)])
+    away = proved_above(graph, section.away, "away", [c * root for c in deviations])
+    proved_above(graph, section.residual, "residual", [x + y * left for x, y in zip(moved, away, strict=True)])
+    doc.done(f"b = {down(b)}" + ("" if cap is None else f", gain at most {down(cap)}"))
+    nodes = range(graph.n)
+    return DecayOfAll(nodes, b, None, left, list(away), list(moved), [root * x for x in phi], list(standing))
+
+
+@dataclass(frozen=True, kw_only=True)
+class LateFamilyForm:
+    """A function of a component of a family under small delays: its root at first, and the share that is left."""
+
+    nodes: Nodes
+    initial: NotNegative
+    left: Fraction
+
+
+def check_forms_of_family(
+    doc: Document,
+    messages: Messages,
+    family: Family,
+    functions: Sequence[FunctionOfSignals],
+    begin: Begin,
+    entries: Sequence[LateFamilyForm],
+) -> list[DecayOfAll]:
+    """Verify ``V <= e^(-b s) initial`` for every signal, ``|x_k'| <= g phi_k V``, of components of a family.
+
+    Return decays to where every agent would settle under the signal; agents whom nobody hears, and who hear nobody,
+    rest.
+    """
+    doc.at = "messages.forms"
+    cap, state, leaders = messages.gain_cap, begin.state, messages.leaders
+    if state is None:
+        raise RejectedError("forms without an initial state")
+    still = leaders is None or (leaders.speed == leaders.disturbance == 0 and leaders.sign_gain is None)
+    need(still and messages.value_error == 0, "forms though leaders move, agents are disturbed, or values are off")
+    need(cap is not None or not messages.delay, "forms without a cap, though something is late")
+    need(not messages.late and bool(entries), "forms of a late own state, or none")
+    late, x, decays, graph = (cap or 0) * messages.delay, list(state), [], family.modes[0].structure.graph
+    for i, entry in enumerate(entries):
+        of = doc.at = f"messages.forms[{i}]"
+        obligation = doc.open("late-form", of)
+        q, b, kap, witness = (obligation[key] for key in ("q", "b", "kap", "witness"))
+        need(0 <= witness.function < len(functions) and witness.psi is None, "no such Lyapunov function, or psi")
+        V = functions[witness.function]
+        nodes = V.component.nodes
+        need(positions(doc, graph, entry.nodes, "nodes of forms") == nodes, "nodes are not those of the function")
+        phi, lag = {v: witness.phi[v] for v in nodes}, late * q
+        bits = length((b, kap, lag, entry.initial, entry.left, V.rate, *phi.values()))
+        spend(30 * len(nodes) * len(family.modes), bits, bits, "small delays")
+        need(b > 0 and b * late <= LARGEST_GROWTH and q >= exp(b * late)[1], "b is not positive, or q below e^(b h)")
+        speeds, unit = least(V.speeds)
+        pushes = []
+        for mode in family.modes:
+            edges = ((edge[0], edge[1], Fraction(edge[4], mode.unit)) for edge in mode.edges if edge[1] in phi)
+            pushes.append(heard_in_mode(edges, phi))
+        for v in nodes:
+            most = Fraction(speeds.get(v, 0), unit) + lag * max(push[v] for push in pushes)
+            need(phi[v] >= most, f"phi of agent {shorten(family.labels[v])} is too small")
+        need(kap >= 0 and all(kap**2 >= V.largest(push) for push in pushes), "kap is too small")
+        need(b + lag * kap <= V.rate / 2, "the delay takes more than the rate")
+        need(entry.initial >= V.root([x[v] for v in range(len(x))]), "initial is not proved")
+        need_left_at_deadline(messages, b, entry.left)
+        falling = [phi[v] * entry.initial for v in nodes]
+        none = [Fraction(0)] * len(nodes)
+        decays.append(DecayOfAll(nodes, b, None, entry.left, [y / b for y in falling], none, falling, none))
+        doc.done(f"b = {down(b)}")
+    rest = sorted(set(range(len(x))) - {end for mode in family.modes for edge in mode.edges for end in edge[:2]})
+    first, none = decays[0], [Fraction(0)] * len(rest)
+    return [*decays, DecayOfAll(rest, first.b, None, first.left, none, none, none, none)]
+
+
+def need_left_at_deadline(messages: Messages, b: Fraction, left: Fraction) -> Fraction:
+    """Verify what is left of ``e^(-b s)`` at ``T``; return how far the clock comes at most, 0 without a cap."""
+    if messages.gain_cap is None:
+        need(left == 0, "left is not 0 though the clock goes on for ever")
+        return Fraction(0)
+    limits = formulas.Limits(messages.gain_cap)
+    need(left >= formulas.decay_above(b * limits.clock_below(messages.gain)), "left is not proved")
+    return limits.clock_above(messages.gain)
+
+
+def heard_in_mode(edges: Iterable[Edge], phi: Mapping[int, Fraction]) -> dict[int, Fraction]:
+    """Return ``sum_l w+_kl phi_l`` of a mode, of sources, targets and largest sizes of edges.
+
+    Examples
+    --------
+    >>> heard_in_mode([(0, 1, Fraction(2))], {0: Fraction(3), 1: Fraction(1)})
+    {0: Fraction(0, 1), 1: Fraction(6, 1)}
+    """
+    total = dict.fromkeys(phi, Fraction(0))
+    for source, target, high in edges:
+        total[target] += high * phi[source]
+    return total
 
 
 def function_of(doc: Document, verified: Verified, k: Any) -> Constants:
@@ -168,9 +286,7 @@ class SettlingWitness:
     u: FewAgents
 
 
-def check_settling(
-    doc: Document, messages: Messages, verified: Verified, section: SettlingSection, inputs: Inputs | None = None
-) -> None:
+def check_settling(doc: Document, messages: Messages, verified: Verified, section: SettlingSection) -> DecayOfAll:
     """Verify ``|x_k - x*_k| <= u_k e^(-b s_c)`` for every agent, leaders by a Lyapunov function of theirs."""
     doc.at = "messages.settling"
     structure, gain = verified.structure, messages.gain
@@ -197,9 +313,14 @@ def check_settling(
     need(min(own) > 0, "u of a follower is not positive")
     followers.starts_within(own, scale)
     followers.need_decay(values, q, b, messages.parts)
-    if inputs is not None:
-        inputs.by_settling(structure, u, b, cap)
     doc.done(f"b = {down(b)}, q = {down(q)}")
+    graph, nothing = structure.graph, [Fraction(0)] * structure.graph.n
+    pulled = [D * x for D, x in zip(graph.diagonal, values, strict=True)]
+    heard = graph.sums_in(values)  # at most (D_k - b) u_k of followers
+    falling = [Fraction(x + y, scale * graph.unit) for x, y in zip(pulled, heard, strict=True)]
+    for v in structure.followers:
+        falling[v] = Fraction(2 * pulled[v], scale * graph.unit) - b * Fraction(values[v], scale)
+    return DecayOfAll(range(graph.n), b, cap, left, list(u), nothing, falling, nothing)
 
 
 def _hear_at_once(messages: Messages, structure: Structure) -> None:

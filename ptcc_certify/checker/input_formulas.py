@@ -281,6 +281,17 @@ class Limits:
         lost = (self.sample_period or 0) * (self.largest_gain(gain) - self.gain_at(gain, Fraction(0)))
         return rounded(max(self.integrals(gain)[0] - lost, Fraction(0)), BITS)
 
+    def clock_above(self, gain: PrescribedGain) -> Fraction:
+        """Bound the integral of a gain up to the deadline from above, without sampling, but for the largest gain.
+
+        Raises
+        ------
+        ValueError
+            Nothing limits the gain: the integral is infinite.
+        """
+        top, turn, (_, high) = self._turn(gain)
+        return rounded(gain.clock(high, 1 - turn / gain.T) + top * (self.end(gain) - turn), BITS, up=True)
+
     def integrals(self, gain: PrescribedGain) -> Interval:
         """Bound the integral of ``gain`` up to the deadline from below, and that of its square from above.
 
@@ -291,13 +302,16 @@ class Limits:
         ValueError
             Nothing limits the gain: the integrals are infinite.
         """
-        top, end = self.largest_gain(gain), self.end(gain)
-        turn = Fraction(0)  # from the turn on the gain is the top
+        top, turn, (low, high) = self._turn(gain)
+        q, rest = 1 - turn / gain.T, self.end(gain) - turn
+        return gain.clock(low, q) + top * rest, gain.square(high, q) + top**2 * rest
+
+    def _turn(self, gain: PrescribedGain) -> tuple[Fraction, Fraction, Interval]:
+        """Return the largest gain, from which instant on it is that, and ``-ln(1 - t/T)`` there."""
+        top, turn = self.largest_gain(gain), Fraction(0)
         if top > gain.value(Fraction(1)):
-            turn = min(gain.T - gain.k / (top - gain.rho1), end)
-        q = 1 - turn / gain.T
-        low, high = log(1 / q, BITS)
-        return gain.clock(low, q) + top * (end - turn), gain.square(high, q) + top**2 * (end - turn)
+            turn = min(gain.T - gain.k / (top - gain.rho1), self.end(gain))
+        return top, turn, log(1 / (1 - turn / gain.T), BITS)
 
 
 def clock_between(gain: PrescribedGain, cap: Fraction | None, a: Fraction, b: Fraction) -> Fraction | None:

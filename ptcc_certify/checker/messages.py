@@ -10,7 +10,15 @@ from itertools import pairwise
 from lmi.exact.decimal_rounding import down
 from lmi.exact.work import spend
 from ptcc_certify.checker.delay_lmi import LateLMI, check_delay_lmi
-from ptcc_certify.checker.delayed_forms import LateForm, SettlingSection, check_form, check_settling
+from ptcc_certify.checker.delayed_forms import (
+    FunctionOfSignals,
+    LateFamilyForm,
+    LateForm,
+    SettlingSection,
+    check_form,
+    check_forms_of_family,
+    check_settling,
+)
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import Family
@@ -23,7 +31,7 @@ from ptcc_certify.checker.missed_deadline import MissedDeadline, check_missed, c
 from ptcc_certify.checker.protocol import Begin, Protocol
 from ptcc_certify.checker.reading import length, need
 from ptcc_certify.checker.section_declarations import Agents, ByFollower, FollowerNumbers, Positive, Several
-from ptcc_certify.checker.stated_bounds import Decay, Inputs, Residual, Vehicles, VehiclesSection
+from ptcc_certify.checker.stated_bounds import Decay, DecayOfAll, Inputs, Residual, Vehicles, VehiclesSection
 from ptcc_certify.checker.stepwise_bounds import Steps
 from ptcc_certify.checker.stepwise_inputs import Walk
 
@@ -67,6 +75,7 @@ class MessagesSection(Delays):
 
     rows: Several[RowsBound]
     steps: StepsBound | None = None
+    forms: Several[LateFamilyForm] | None = None
     residual: Agents | None = None
     missed: MissedDeadline | None = None
     staged: ByFollower[Fraction] | None = None
@@ -77,8 +86,14 @@ class MessagesSection(Delays):
     vehicles: VehiclesSection | None = None
 
 
-def check_messages(doc: Document, of: Verified | Family, protocol: Protocol, begin: Begin) -> None:
-    """Verify everything that is said of late messages, if there is something."""
+def check_messages(
+    doc: Document,
+    of: Verified | Family,
+    protocol: Protocol,
+    begin: Begin,
+    functions: Sequence[FunctionOfSignals] = (),
+) -> None:
+    """Verify everything that is said of late messages, if there is something; ``functions`` are those of a family."""
     if "messages" not in doc:
         return
     if isinstance(of, Family):
@@ -91,45 +106,64 @@ def check_messages(doc: Document, of: Verified | Family, protocol: Protocol, beg
         need(all(getattr(section, key) is None for key in AT_REST), f"one of {', '.join(AT_REST)} though leaders move")
         need(section.steps is None or messages.leaders.sign_gain is None, "steps beside a sign term")
     need(len(section.rows) <= MANY_ROWS, f"more than {MANY_ROWS} witnesses of rows")
-    bounded = bool(section.rows) or section.steps is not None
-    by_rows = bounded or section.missed is not None or section.staged is not None
-    whole = any(x is not None for x in (section.settling, section.form, section.lmi))
+    by_rows = bool(section.rows) or section.steps is not None
+    bounded = by_rows or section.forms is not None
+    by_rows = by_rows or section.missed is not None or section.staged is not None
+    whole = any(x is not None for x in (section.settling, section.form, section.lmi, section.forms))
     need(by_rows or whole, "nothing is stated of late messages")
-    need(bounded == (section.residual is not None), "a residual is stated iff rows or steps bound it")
+    need(bounded == (section.residual is not None), "a residual is stated iff rows, steps or forms bound it")
+    residual = None if section.residual is None else Residual(doc, section.residual)
     inputs = None if section.input is None else Inputs(doc, messages, section.input)
     vehicles = None
     if section.vehicles is not None:
-        need(not protocol.sliding and bool(section.rows), "vehicles without rows, or under the sliding-mode protocol")
+        need(bool(section.rows) or whole, "vehicles without rows, settling, form and lmi")
+        need(not protocol.sliding, "vehicles under the sliding-mode protocol")
         vehicles = Vehicles(doc, messages, section.vehicles)
-    if isinstance(of, Family):
-        need(
-            all(getattr(section, key) is None for key in OF_ONE_GRAPH), f"one of {', '.join(OF_ONE_GRAPH)} of a family"
-        )
+    stated, decays = [one for one in (residual, inputs, vehicles) if one is not None], list[DecayOfAll]()
     if by_rows:
         need(not messages.late, "rows, steps, missed or staged of a late own state")
         followers = followers_of(doc, of if isinstance(of, Family) else of.structure, begin)
-        residual = None if section.residual is None else Residual(doc, followers, section.residual)
-        stated = [one for one in (residual, inputs, vehicles) if one is not None]
+        if residual is not None:
+            residual.behind(followers)
         for k, entry in enumerate(section.rows):
             _check_rows(doc, messages, followers, entry, f"messages.rows[{k}]", stated)
         if isinstance(of, Verified) and section.steps is not None:
             _check_steps(doc, messages, followers, of.structure.graph, section.steps.instants, stated)
-        if residual is not None:
-            residual.close(doc)
-        if isinstance(of, Verified) and section.missed is not None:
-            check_missed(doc, messages, of.structure, begin, section.missed)
-        if isinstance(of, Verified) and section.staged is not None:
-            check_staged(doc, messages, of.structure, section.staged)
+    if isinstance(of, Family):
+        alone = all(getattr(section, key) is None for key in OF_ONE_GRAPH)
+        need(alone, f"one of {', '.join(OF_ONE_GRAPH)} of a family")
+        if section.forms is not None:
+            decays = check_forms_of_family(doc, messages, of, functions, begin, section.forms)
+    if residual is not None:
+        for decay in decays:
+            residual.of_all(decay)
+        residual.close(doc)
     if isinstance(of, Verified):
-        if section.settling is not None:
-            check_settling(doc, messages, of, section.settling, inputs)
-        if section.form is not None:
-            check_form(doc, messages, of, section.form, inputs)
-        if section.lmi is not None:
-            check_delay_lmi(doc, messages, of, section.lmi, inputs)
+        decays = _check_one_graph(doc, messages, of, begin, section)
     for one in (inputs, vehicles):
         if one is not None:
+            for decay in decays:
+                one.of_all(decay)
             one.close(doc)
+
+
+def _check_one_graph(
+    doc: Document, messages: Messages, of: Verified, begin: Begin, section: MessagesSection
+) -> list[DecayOfAll]:
+    """Verify what is said of one graph alone; return its decays of all agents."""
+    need(section.forms is None, "forms of one graph")
+    if section.missed is not None:
+        check_missed(doc, messages, of.structure, begin, section.missed)
+    if section.staged is not None:
+        check_staged(doc, messages, of.structure, section.staged)
+    decays = []
+    if section.settling is not None:
+        decays.append(check_settling(doc, messages, of, section.settling))
+    if section.form is not None:
+        decays.append(check_form(doc, messages, of, section.form))
+    if section.lmi is not None:
+        decays.append(check_delay_lmi(doc, messages, of, section.lmi))
+    return decays
 
 
 def _check_rows(

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from operator import mul
+from typing import NamedTuple
 
 from lmi.exact.decimal_rounding import down, up
 from lmi.exact.numbers import integers, longest, shorten
@@ -25,7 +26,6 @@ from ptcc_certify.checker.reading import RejectedError, length, need
 from ptcc_certify.checker.section_declarations import Agents, Positive
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.stepwise_inputs import AgentSteps, VehicleSteps, Walk
-from ptcc_certify.checker.structure import Structure
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,34 @@ class Decay:
     floor: Fraction
     drift: Fraction
     highest: Fraction
+
+
+@dataclass(frozen=True)
+class DecayOfAll:
+    """A decay of agents up to ``T``: ``|x_k - x*_k| <= away_k y + floor_k``, ``|e_k| <= falling_k y + standing_k``.
+
+    Attributes
+    ----------
+    nodes : sequence of int
+        Whose.
+    b : Fraction
+        Its rate, ``y = e^(-b s_c)``.
+    cap : Fraction or None
+        Of its clock.
+    left : Fraction
+        What is left of it at ``T``.
+    away, floor, falling, standing : sequences of Fraction
+        By node.
+    """
+
+    nodes: Sequence[int]
+    b: Fraction
+    cap: Fraction | None
+    left: Fraction
+    away: Sequence[Fraction]
+    floor: Sequence[Fraction]
+    falling: Sequence[Fraction]
+    standing: Sequence[Fraction]
 
 
 class Stated:
@@ -107,7 +135,7 @@ class Stated:
 
 
 class Residual:
-    """What is stated of ``|x_k(T) - x*_k|`` of followers; leaders rest.
+    """What is stated of ``|x_k(T) - x*_k|``.
 
     Parameters
     ----------
@@ -116,9 +144,17 @@ class Residual:
         By agent.
     """
 
-    def __init__(self, doc: Document, followers: Followers, values: Numbers):
+    def __init__(self, doc: Document, values: Numbers):
         doc.at = "messages.residual"
-        self.stated = Stated("residual", followers.labels, values)
+        self.stated = Stated("residual", doc.context.labels, values)
+
+    def of_all(self, decay: DecayOfAll) -> None:
+        """Mark what is at least as large as a decay leaves it."""
+        (at_T,), scale = integers([[x * decay.left + y for x, y in zip(decay.away, decay.floor, strict=True)]])
+        self.stated.meet(decay.nodes, (Fraction(1, scale), at_T))
+
+    def behind(self, followers: Followers) -> None:
+        """Verify that nothing is stated of leaders that rest."""
         self.stated.rest(followers.others, "a residual of a leader that rests")
 
     def by_rows(self, rows: Rows, decay: Decay) -> None:
@@ -202,22 +238,12 @@ class Inputs:
             raise RejectedError("an input without a cap of the gain")
         return gain_above(self.messages.gain, self.gain_cap, b, cap)
 
-    def by_settling(self, structure: Structure, u: Numbers, b: Fraction, cap: Fraction) -> None:
-        """Mark what is at least ``(2 D_k - b) u_k y`` of followers, ``(D_l u_l + heard_l) y`` of leaders."""
-        graph = structure.graph
-        values, scale = u.over(range(graph.n))
-        y, heard = self._gain_above(b, cap) / scale, graph.sums_in(values)
-        sent = list(map(mul, graph.diagonal, values))
-        of_followers = ([column[v] for v in structure.followers] for column in (sent, values))
-        self.stated.meet(structure.followers, *zip((2 * y / graph.unit, -b * y), of_followers, strict=True))
-        leaders = [v for group in structure.closed for v in group]
-        self.stated.meet(leaders, (y / graph.unit, [sent[v] + heard[v] for v in leaders]))
-
-    def by_form(self, phi: Sequence[Fraction], b: Fraction, root: Fraction) -> None:
-        """Mark what is at least ``phi_k sqrt(V(0)) y``."""
-        (values,), scale = integers([phi])
-        y = root * self._gain_above(b)
-        self.stated.meet(range(len(values)), (y / scale, values))
+    def of_all(self, decay: DecayOfAll) -> None:
+        """Mark what is at least ``falling_k sup g e^(-b s) + gain_cap standing_k``, under a cap."""
+        if self.gain_cap is not None:
+            (falling, standing), scale = integers([decay.falling, decay.standing])
+            y = self._gain_above(decay.b, decay.cap)
+            self.stated.meet(decay.nodes, (y / scale, falling), (self.gain_cap / scale, standing))
 
     def close(self, doc: Document) -> None:
         """Verify that a bound meets what is stated of every agent."""
@@ -225,10 +251,6 @@ class Inputs:
         doc.open("late-input", "messages.input")
         self.stated.close()
         doc.done(f"at most {up(self.stated.largest)}")
-
-
-#: Coefficients of ``|v_k(0)|``, of ``u_k``, of ``D_k u_k + sum_l |w_kl| u_l``, of ``D_k u_k`` and of ``D_k``.
-Coefficients = tuple[Fraction, Fraction, Fraction, Fraction, Fraction]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -243,34 +265,43 @@ class VehiclesSection:
     input: Agents | None = None
 
 
-def coefficients(messages: Messages, decay: Decay, a1: Fraction, a2: Fraction) -> tuple[Coefficients, ...]:
-    """Return by what positions at ``T`` are bounded, and under a cap velocities and inputs up to ``T``.
+class Passed(NamedTuple):
+    """By what a bound of vehicles grows with ``|v_k(0)|``, and with what falls and what stands of virtual states."""
+
+    begun: Fraction
+    falling: Fraction
+    standing: Fraction
+
+
+def passed_on(
+    messages: Messages, b: Fraction, left: Fraction, cap: Fraction | None, gains: tuple[Fraction, Fraction]
+) -> tuple[Passed, ...]:
+    """Return what vehicles make of a decay of virtual states, ``y = e^(-b s_c)``, by ``a_1`` and ``a_2``.
+
+    First of positions at ``T``: ``|z_k - x*_k|`` at ``T``, without and with what stands of it; then, under a cap, of
+    velocities and inputs up to ``T``: ``p_k`` and ``n_k``, where ``|e_k| <= p_k y + n_k``.
 
     Examples
     --------
     >>> from ptcc_certify.checker.input_formulas import PrescribedGain
     >>> gain = PrescribedGain(Fraction(1), Fraction(1), Fraction(1))
     >>> messages = Messages(gain, Numbers([Fraction(0)]), Fraction(0), False, Fraction(0), Fraction(2))
-    >>> decay = Decay(*map(Fraction, (1, 2)), Fraction(1, 4), Fraction(1), *[Fraction(0)] * 3)
-    >>> [[float(x) for x in row] for row in coefficients(messages, decay, Fraction(2), Fraction(2))]
-    [[0.125, 0.5, 0.0, 0.0, 0.0], [3.0, -4.0, 0.0, 8.0, 0.0], [20.0, -32.0, 0.0, 64.0, 0.0]]
+    >>> one, left = Fraction(1), Fraction(1, 4)
+    >>> for passed in passed_on(messages, one, left, 2 * one, (2 * one, 2 * one)):
+    ...     print(*map(float, passed))
+    0.125 2.0 1.0
+    3.0 4.0 2.0
+    20.0 32.0 20.0
     """
-    gain, zero, b, M, error = messages.gain, Fraction(0), decay.b, decay.initial, messages.wrong
-    first, k = messages.least_gain(), gain.k
-    lag, G = 1 / (a1 - b), messages.gain_cap
-    position = (decay.left * lag / first, a1 * lag * (M * decay.left + decay.drift) + decay.floor, zero, zero, zero)
+    gain, (a1, a2), first, G = messages.gain, gains, messages.least_gain(), messages.gain_cap
+    lag, turn = 1 / (a1 - b), a1 / gain.k + a1 * a1
+    position = Passed(left * lag / first, a1 * lag, Fraction(1))
     if G is None:
         return (position,)
-    y, square = gain_above(gain, G, b, decay.cap), gain_above(gain, G, b / 2, decay.cap) ** 2
-    turn = a1 / k + a1 * a1
-    found = [position]
-    for moved, own, pulled, steady in (
-        (y, 1 + a1 * lag, a1 * lag, G),
-        (square, turn * lag + a1 + a2, turn * lag + a1, (1 / k + 2 * a1) * G * G),
-    ):
-        pull = moved * pulled * M
-        found.append((moved * own / first, -b * pull, steady * decay.highest, 2 * pull, steady * error))
-    return tuple(found)
+    y, square = gain_above(gain, G, b, cap), gain_above(gain, G, b / 2, cap) ** 2
+    velocity = Passed(y * (1 + a1 * lag) / first, y * a1 * lag, G)
+    whole = Passed(square * (turn * lag + a1 + a2) / first, square * (turn * lag + a1), (1 / gain.k + 2 * a1) * G * G)
+    return position, velocity, whole
 
 
 class Vehicles:
@@ -303,22 +334,49 @@ class Vehicles:
 
     def by_rows(self, rows: Rows, decay: Decay) -> None:
         """Mark what is at least as large as this decay makes it, unless it is too fast for the gains."""
-        section, messages, followers = self.section, self.messages, rows.followers
+        followers, b, M = rows.followers, decay.b, decay.initial
         begun, others = [abs(v) for v in self.begun], followers.others
-        if messages.leaders is not None:
+        if self.messages.leaders is not None:
             need(not any(begun[v] for v in others), "an initial velocity of a leader that moves as it likes")
-        bits = length((decay.b, decay.left, decay.initial, decay.floor, decay.highest, section.a1, section.a2))
+        bits = length((M, decay.floor, decay.highest))
         spend(100, bits, bits, "bounds of vehicles")
-        if decay.b >= section.a1 or decay.b > section.a2:
+        if (passed := self._passed(b, decay.left, decay.cap)) is None:
             return
         (heard, unit), (degrees, _) = rows.largest, followers.degrees
-        pulled = list(map(mul, degrees, rows.u))
-        columns = [[begun[v] for v in followers.nodes], rows.u, heard, pulled, degrees]
-        over = self.scale, rows.scale, rows.scale * unit, rows.scale * unit, unit
-        for one, row in zip(self.stated, coefficients(messages, decay, section.a1, section.a2), strict=True):
-            factors = [x / common for x, common in zip(row, over, strict=True)]
-            one.meet(followers.nodes, *zip(factors, columns, strict=True))
-            one.meet(others, (factors[0], [begun[v] for v in others]))
+        of, common = followers.nodes, rows.scale * unit
+        pulled, own = list(map(mul, degrees, rows.u)), [begun[v] for v in of]
+        first = passed[0].falling * (M * decay.left + decay.drift) + decay.floor
+        self.stated[0].meet(of, (passed[0].begun / self.scale, own), (first / rows.scale, rows.u))
+        for one, (by_begun, falling, standing) in zip(self.stated[1:], passed[1:], strict=True):
+            one.meet(
+                of,
+                (by_begun / self.scale, own),
+                (2 * falling * M / common, pulled),
+                (-b * falling * M / rows.scale, rows.u),
+                (standing * decay.highest / common, heard),
+                (standing * self.messages.wrong / unit, degrees),
+            )
+        for one, (by_begun, _, _) in zip(self.stated, passed, strict=True):
+            one.meet(others, (by_begun / self.scale, [begun[v] for v in others]))
+
+    def of_all(self, decay: DecayOfAll) -> None:
+        """Mark what is at least as large as a decay of all agents makes it, unless it is too fast for the gains."""
+        if (passed := self._passed(decay.b, decay.left, decay.cap)) is None:
+            return
+        columns = [x * decay.left for x in decay.away], decay.floor, decay.falling, decay.standing
+        (away, floor, falling, standing), scale = integers(columns)
+        begun = [abs(self.begun[v]) for v in decay.nodes]
+        pairs = [(away, floor), *[(falling, standing)] * 2]
+        for one, row, (falls, stands) in zip(self.stated, passed, pairs, strict=False):
+            terms = (row.begun / self.scale, begun), (row.falling / scale, falls), (row.standing / scale, stands)
+            one.meet(decay.nodes, *terms)
+
+    def _passed(self, b: Fraction, left: Fraction, cap: Fraction | None) -> tuple[Passed, ...] | None:
+        """Return what vehicles make of a decay of virtual states; None if it is too fast for the gains."""
+        a1, a2 = gains = self.section.a1, self.section.a2
+        bits = length((b, left, *gains))
+        spend(100, bits, bits, "bounds of vehicles")
+        return None if b >= a1 or b > a2 else passed_on(self.messages, b, left, cap, gains)
 
     def along(self, walk: Walk) -> VehicleSteps | None:
         """Return what follows vehicles from instant to instant; None without a cap of the gain."""

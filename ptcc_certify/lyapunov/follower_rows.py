@@ -296,8 +296,8 @@ def listeners(family: Family) -> np.ndarray:
     return np.unique(family.union[1])
 
 
-def refuse_other_targets(family: Family, asked: str = "late messages") -> None:
-    """Refuse a family of whose members the followers of leaders that are single nodes have no common targets.
+def leading_group(family: Family, asked: str = "late messages") -> str | None:
+    """Return who leads and hears others in some mode, or None; refuse a family whose targets depend on the signal.
 
     Parameters
     ----------
@@ -308,21 +308,45 @@ def refuse_other_targets(family: Family, asked: str = "late messages") -> None:
     Raises
     ------
     HypothesisError
-        Tells who hears whom, or that the targets depend on the signal.
+        The targets depend on the signal.
+
+    Examples
+    --------
+    >>> leading_group(Family.from_intervals([(1, 2, 1, 2), (2, 1, 1, 2)]))
+    '1'
     """
+    found = None
     for component in decide(family):
-        labels, kernel = component.family.labels, component.kernel
+        kernel = component.kernel
         if kernel is None or component.behaviour is None:
             where = "where the signal decides where agents are drawn to"
             raise HypothesisError(f"with {asked} nothing is proved yet of families {where}; leave it out")
         heard = set(listeners(component.family).tolist())
         group = next((c for c in kernel.structure.closed_components if heard.intersection(c.nodes)), None)
-        if group is not None:
-            leader = shorten(labels[group.nodes[0]])
-            raise HypothesisError(
-                f"with {asked} nothing is proved yet of families some of whose leaders hear others; "
-                f"{leader} leads and hears others: leave it out"
-            )
+        if found is None and group is not None:
+            found = shorten(component.family.labels[group.nodes[0]])
+    return found
+
+
+def refuse_other_targets(family: Family, asked: str = "late messages", mend: str = "leave it out") -> None:
+    """Refuse a family of whose members the followers of leaders that are single nodes have no common targets.
+
+    Parameters
+    ----------
+    family : Family
+    asked, mend : str
+        What is asked of it, and what to do instead.
+
+    Raises
+    ------
+    HypothesisError
+        Tells who hears whom, or that the targets depend on the signal.
+    """
+    if (leader := leading_group(family, asked)) is not None:
+        raise HypothesisError(
+            f"with {asked} nothing is proved yet of families some of whose leaders hear others; "
+            f"{leader} leads and hears others: {mend}"
+        )
 
 
 def _smallest(M: Any) -> float:

@@ -190,6 +190,12 @@ lambda of L, or measure the own state without delay
         return f"{' and '.join(self.flaws) or 'late'} messages"
 
     @property
+    def at_rest(self) -> bool:
+        """Whether leaders that hear nobody rest, nothing disturbs anybody, and no value is off."""
+        leaders = self.leaders
+        return not self.value_error and (leaders is None or (not leaders.total and leaders.sign_gain is None))
+
+    @property
     def asked(self) -> str:
         """What is asked by them, in words: late messages, virtual positions, leaders that move, or a cap alone."""
         if not self.exact:

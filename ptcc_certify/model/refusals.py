@@ -207,10 +207,8 @@ def _refuse_messages(structure: Structure, messages: LateMessages, caps: Sequenc
         raise ParameterError("gain_cap", "limits and late messages have two; give both the same, or messages alone")
     if messages.value_error and messages.own_delay:
         raise ParameterError("values that are off are not certified where the own state is late; leave one of them out")
-    if messages.vehicles is not None:
-        refuse_leader_groups(structure, "virtual positions that are exchanged: not proved yet of groups; a bound")
-    if messages.value_error:
-        refuse_leader_groups(structure, "what values that are off add: a bound")
+    if messages.value_error and messages.gain_cap is None:
+        refuse_leader_groups(structure, "what values that are off add: add a gain cap; otherwise a bound")
     if messages.gain_cap is None and not messages.leaders_hear_at_once(structure):
         at_once = f"delays of 0 within their group{', and no period' if messages.held else ''}"
         mend = f"add a gain cap, or let leaders hear each other at once ({at_once})"

@@ -152,7 +152,7 @@ def _draw_family(
     small = bool(runs) and proof.family.n_nodes <= TRACED_NODES
     there = {"graph": proof.family.n_nodes <= DRAWN_NODES, "states": small, "input": small}
     there["decay"] = bool(runs) and proof.common and proof.rate is not None
-    if proof.late is not None and proof.late.rows:
+    if proof.late is not None and proof.late.says_something:
         there["tracking" if proof.late.tracks else "late"] = True
     figures = _figures(saved, [name for name in wanted if there.get(name)], runs)
     for number, (_, _, component, one) in enumerate(why):

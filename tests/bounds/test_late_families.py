@@ -320,8 +320,11 @@ def test_disturbances_and_noise_of_a_family_are_those_of_followers_and_of_what_i
 def test_other_limits_of_families_are_refused(more: dict[str, Any]):
     with pytest.raises(ParameterError, match="families take one gain cap alone"):
         certify(UNSURE, PROTOCOL, [1, 2, -3], **more)
-    with pytest.raises(HypothesisError, match="leads and hears others"):
-        certify(Family.from_intervals([(1, 2, 1, 2), (2, 1, 1, 2)]), PROTOCOL, limits=GainLimits(gain_cap=9))
+    group, asked = Family.from_intervals([(1, 2, 1, 2), (2, 1, 1, 2)]), GainLimits(gain_cap=9)
+    with pytest.raises(HypothesisError, match=r"with inexact messages.*leads and hears others: leave it out"):
+        certify(group, PROTOCOL, limits=asked, asks=Asks(noise=1))
+    with pytest.raises(HypothesisError, match=r"with late messages.*leads and hears others: add a gain cap"):
+        certify(group, PROTOCOL, messages=LateMessages("0.01"))
 
 
 @pytest.mark.few(0)

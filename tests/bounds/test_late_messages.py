@@ -162,7 +162,7 @@ def _judge_settling(seed: int, patterns: tuple[str, ...] = PATTERNS) -> float:
     for pattern in patterns:
         run = simulate_late(graph, protocol, messages, [float(x) for x in x0], pattern=(pattern, seed), steps=300)  # type: ignore[arg-type]
         away = np.maximum(np.abs(run.states - end[:, None]) - FLOOR * 10 * float(max(map(abs, x0))), 0)
-        ratios = [away / np.maximum(cert.late.settling.deviation_bound(cert.late.case, run.t), 1e-300)]
+        ratios = [away / np.maximum(cert.late.settling.over_time(cert.late.case, run.t).bound, 1e-300)]
         ratios.append(away[:, -1] / np.maximum(cert.late.settling.residual, 1e-300))
         ratios += [] if cert.late.input is None else [np.abs(run.input) / cert.late.input[:, None]]
         worst = max(worst, *(float(ratio.max()) for ratio in ratios))

@@ -367,7 +367,7 @@ def test_parts_that_stand_alone_or_are_missing_are_refused():
     stated = ("steps", "residual", "missed", "staged", "form", "input")
     empty = {key: x for key, x in data["messages"].items() if key not in stated} | {"rows": []}
     assert "nothing is stated" in reason(changed(data, TOP, empty))
-    assert "iff rows or steps" in reason(without(data, (*TOP, "residual")))
+    assert "iff rows, steps or forms" in reason(without(data, (*TOP, "residual")))
     for key in (*stated, "packets", "gain_cap", "leaders", "settling", "lmi", "vehicles"):
         assert f"{key} is null, and not left out" in reason(data, (*TOP, key), None)
     assert '"more" is not known' in reason(data, TOP, {**data["messages"], "more": None})
@@ -666,7 +666,7 @@ def test_small_delays_that_are_not_small_enough_are_refused():
     assert "kap is too small" in reason(data, (*told, "numbers", "kap"), str(kap * F(99, 100)))
     assert "kap is too small" in reason(data, (*told, "numbers", "kap"), str(-kap))
     assert "left is not proved" in reason(data, (*TOP, "form", "left"), "0")
-    for key in ("moved", "residual"):
+    for key in ("moved", "away", "residual"):
         for label, x in data["messages"]["form"][key].items():
             if F(x):
                 less = str(F(x) * F(999, 1000))
@@ -684,7 +684,8 @@ def test_no_other_lyapunov_function_stands_for_it():
     for k in (True, "0", None):
         assert "function is not an integer" in reason(data, told, k)
     strong = plain(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)]), nominal(), [3, 5], method="paper")
-    said = {**data["messages"], "form": {"left": "1", "moved": {"1": "1", "2": "1"}, "residual": {"1": "9", "2": "9"}}}
+    agents = {"moved": {"1": "1", "2": "1"}, "away": {"1": "9", "2": "9"}, "residual": {"1": "9", "2": "9"}}
+    said = {**data["messages"], "form": {"left": "1", **agents}}
     del said["input"]
     witness = {"function": 0, "phi": {"1": "9", "2": "9"}}
     proof = [*strong["proof"], obligation("late-form", "messages.form", {"q": "2", "b": "1/9", "kap": "9"}, witness)]

@@ -266,7 +266,7 @@ def test_agents_that_begin_on_their_targets_are_not_said_to_get_little_nearer(wo
         (("team.csv", "--leader-speed", "1", "--initial-bound", "1"), "--initial-bound is not taken up"),
         (("team.csv", "--delay", "0.1", "--stop-before", "0.1"), "--stop-before: late messages are certified under a"),
         (("team.csv", "--delay", "0.1", "--sample-period", "0.1"), "--sample-period: of late messages a period tells"),
-        (("group.csv", "--delay", "0.1", "--gain-cap", "9", "--noise", "1"), "what values that are off add: a bound"),
+        (("group.csv", "--delay", "0.1", "--noise", "1"), "what values that are off add: add a gain cap; otherwise"),
         (
             ("group.csv", "--delay", "0.1", "--delta", "1"),
             "disturbances where messages are late: a bound needs leaders",
@@ -277,10 +277,7 @@ def test_agents_that_begin_on_their_targets_are_not_said_to_get_little_nearer(wo
         ),
         (("team.csv", "--uncertainty", "1%", "--delay", "none"), 'no column "none"; add it, or name one of source'),
         (("group.csv", "--uncertainty", "1%", "--delta", "1"), "a leads and hears others: leave it out"),
-        (
-            ("group.csv", "--uncertainty", "1%", "--gain-cap", "9"),
-            "a leads and hears others: leave it out",
-        ),
+        (("group.csv", "--uncertainty", "1%", "--delay", "0.1"), "a leads and hears others: add a gain cap"),
         (("team.csv", "--uncertainty", "1%", "--max-residual", "1"), "--max-residual is asked of late messages"),
         (("team.csv", "--delay", "1e"), "give a number in your unit of time, or the name of a column"),
         (("team.csv", "--delay", "latency"), 'team.csv, line 1: no column "latency"; add it, or name one of'),

@@ -91,7 +91,9 @@ def test_labels_that_look_like_signs_stand_as_they_are():
 
 
 def test_what_holds_from_the_deadline_on_holds_at_it():
-    late: Any = SimpleNamespace(leaders=object(), relative=False, settling=None, vehicles=None)
+    late: Any = SimpleNamespace(
+        leaders=object(), relative=False, settling=None, vehicles=None, forms=(), goal="its target"
+    )
     for largest, after, at in ((0.025, 0.0195, "0.02"), (0.0095, 0.0195, "0.0095")):
         late.largest, late.after = largest, after
         assert _within_text(late, 2) == f"every follower within {at} of its target at T, within 0.02 from then on"

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from fractions import Fraction
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from lmi.exact.decimal_rounding import float_down
+from lmi.exact.decimal_rounding import float_down, float_up
 from lmi.exact.elementary_enclosures import rounded
 from ptcc_certify.bounds.decay import Decay
 from ptcc_certify.bounds.final_state.of_graph import Influence
@@ -19,10 +20,11 @@ from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above, gain_
 from ptcc_certify.checker.lyapunov_form import Form
 from ptcc_certify.checker.message_ages import PARTS, Messages, Moving
 from ptcc_certify.checker.side_files import Numbers
+from ptcc_certify.checker.stated_bounds import DecayOfAll
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.lyapunov.follower_rows import listeners
+from ptcc_certify.lyapunov.follower_rows import leading_group, listeners
 from ptcc_certify.model.base import Protocol
 from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.late_messages import LateMessages
@@ -62,6 +64,41 @@ class DecayingForm:
     form: Form
     errors: Sequence[Fraction]
     deviations: Sequence[Fraction]
+
+
+class Moments(NamedTuple):
+    """A decay of all agents over time: ``|x_k - x_k*|`` is at most what decays and what stands.
+
+    Its rate, ``e^(-b s)`` of its clock, (M,), and by agent, (N, M) and (N, 1), in floats from above.
+    """
+
+    b: float
+    y: np.ndarray
+    decaying: np.ndarray
+    standing: np.ndarray
+
+    @property
+    def bound(self) -> np.ndarray:
+        """Their sum, ``(N, M)``."""
+        return np.asarray((self.decaying + self.standing) * (1 + 1e-9))
+
+
+def moments(
+    case: LateCase,
+    b: Fraction,
+    away: Sequence[Fraction],
+    moved: Sequence[Fraction],
+    t: np.ndarray,
+    cap: Fraction | None = None,
+) -> Moments:
+    """Return a decay ``|x_k - x_k*| <= away_k e^(-b s_c) + moved_k`` of all agents at instants, ``cap`` of its clock.
+
+    Where values are off it is proved up to ``T`` alone: errors go on to push the agents after it.
+    """
+    y = case.decay(b, t, cap)
+    first, standing = (np.array([[float_up(x)] for x in values]) for values in (away, moved))
+    after = np.where((t > float(case.protocol.T)) & (case.messages.value_error > 0), np.inf, 0.0)
+    return Moments(float(b), y, first * y + after, standing)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,15 +164,21 @@ class LateCase:
 
     @property
     def of_whole_graph(self) -> bool:
-        """Whether Lyapunov functions of the whole graph may forgive what is late: under a cap, leaders at rest."""
-        still = self.leaders is None and self.initial_state is not None and not self.messages.value_error
-        return still and self.messages.gain_cap is not None and self.influence is not None and self.influence.exact
+        """Whether Lyapunov functions of the whole graph may say something of it: leaders rest, and ends are known."""
+        known = self.initial_state is not None and self.influence is not None and self.influence.exact
+        return known and self.leaders is None
 
     @property
     def state(self) -> Sequence[Fraction]:
         """The initial state, if there is one."""
         assert self.initial_state is not None
         return self.initial_state
+
+    @cached_property
+    def led_by_groups(self) -> bool:
+        """Whether Lyapunov functions of a family may say something of it, where no rows do: leaders hear others."""
+        assert isinstance(self.structure, Family)
+        return self.messages.at_rest and leading_group(self.structure) is not None
 
     @cached_property
     def groups(self) -> list[int]:
@@ -210,6 +253,18 @@ class LateCase:
         """Bound ``sup_t g e^(-b s)`` from above, ``g`` the gain that acts, which has a cap."""
         assert self.messages.gain_cap is not None
         return gain_above(self.protocol.gain.exact, self.messages.gain_cap, b, cap)
+
+    def inputs(self, decay: DecayOfAll) -> np.ndarray:
+        """Return what a decay says of ``|x_k'|`` up to ``T`` under a cap of the gain, ``(N,)`` floats from above."""
+        y, cap = self.highest(decay.b, decay.cap), self.messages.gain_cap or Fraction(0)
+        bounds = [float_up(x * y + cap * n) for x, n in zip(decay.falling, decay.standing, strict=True)]
+        return self.of_nodes(decay.nodes, np.array(bounds) * (1 + 1e-9) + 1e-300)
+
+    def of_nodes(self, nodes: Sequence[int], bounds: np.ndarray) -> np.ndarray:
+        """Return bounds of some agents as those of all, infinite of others."""
+        found = np.full((len(self.of.labels), *bounds.shape[1:]), np.inf)
+        found[list(nodes)] = bounds
+        return found
 
 
 def asked_leaders(leaders: MovingLeaders | None) -> Moving | None:

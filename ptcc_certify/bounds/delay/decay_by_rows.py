@@ -31,7 +31,7 @@ from lmi.dyadic import round_to_bits
 from lmi.errors import LMIError, NoCertificate
 from lmi.exact.decimal_rounding import float_up
 from lmi.exact.elementary_enclosures import log, rounded
-from ptcc_certify.bounds.delay.case import LateCase
+from ptcc_certify.bounds.delay.case import LateCase, Moments
 from ptcc_certify.checker.input_formulas import BITS, drift_above
 from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
 from ptcc_certify.model.gain import Gain
@@ -98,6 +98,12 @@ class RowBound:
         """Return what bounds ``|x_k - x_k*|`` of followers at instants, ``(F, M)`` floats."""
         y, added = self.decay(case, t)
         return self.witness.u[:, None] * (float(self.initial) * y + (float(self.floor) + added)) * MORE
+
+    def over_time(self, case: LateCase, t: np.ndarray) -> Moments:
+        """Return the same of all agents, 0 of others than followers."""
+        (y, added), u = self.decay(case, t), np.zeros((len(case.of.labels), 1))
+        u[case.followers, 0] = self.witness.u
+        return Moments(float(self.witness.b), y, u * (float(self.initial) * y + added), u * float(self.floor))
 
     def highest_floor(self, case: LateCase) -> Fraction:
         """Return what errors of values, leaders that move and disturbances add at most up to ``T``."""

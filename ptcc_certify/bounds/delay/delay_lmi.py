@@ -19,13 +19,13 @@ import numpy as np
 from lmi.delay import LateSystem, delay_lyapunov
 from lmi.errors import LMIError
 from lmi.exact import arithmetic
-from lmi.exact.decimal_rounding import float_up
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.numbers import common_denominator
 from lmi.exact.work import WorkError
-from ptcc_certify.bounds.delay.case import LateCase
+from ptcc_certify.bounds.delay.case import LateCase, Moments, moments
 from ptcc_certify.checker.delay_lmi import DelayLMI, LateLoop, Row, channels_of
 from ptcc_certify.checker.input_formulas import BITS
+from ptcc_certify.checker.stated_bounds import DecayOfAll
 
 #: Above so many free agents nothing is searched; above the other the first function that is found is taken, and the
 #: longest delay sought by factors of 2 alone: a search takes 0.3 s with 20 free agents, 2 to 4 s with 30, 10 s with 40.
@@ -71,10 +71,9 @@ class DelayLMIBound:
     away: tuple[Fraction, ...]
     residual: tuple[Fraction, ...]
 
-    def deviation_bound(self, case: LateCase, t: np.ndarray) -> np.ndarray:
-        """Return what bounds ``|x_k - (Q X(0))_k|`` at instants, ``(N, M)`` floats."""
-        moved, away = (np.array([[float_up(x)] for x in values]) for values in (self.moved, self.away))
-        return np.asarray((moved + away * case.decay(self.b, t)) * float(_MORE))
+    def over_time(self, case: LateCase, t: np.ndarray) -> Moments:
+        """Return what bounds ``|x_k - (Q X(0))_k|`` at instants."""
+        return moments(case, self.b, self.away, self.moved, t)
 
 
 class DelayLMIBounds:
@@ -89,7 +88,9 @@ class DelayLMIBounds:
     @staticmethod
     def asked(case: LateCase) -> bool:
         """Tell whether such bounds are asked of a case."""
-        return case.of_whole_graph
+        messages = case.messages
+        late = messages.age > 0 and not messages.value_error and messages.gain_cap is not None
+        return case.of_whole_graph and late
 
     def __init__(self, case: LateCase):
         cap, clock = case.messages.gain_cap, case.clock()
@@ -130,8 +131,8 @@ class DelayLMIBounds:
         """Whether anything is searched."""
         return 0 < self._free <= LARGEST
 
-    def best(self) -> tuple[DelayLMIBound, np.ndarray] | None:
-        """Return what leaves least at ``T`` of what is found, with bounds of inputs; None if nothing is."""
+    def best(self) -> tuple[DelayLMIBound, DecayOfAll] | None:
+        """Return what leaves least at ``T`` of what is found, and what it says of all agents; None if nothing is."""
         if not self._small:
             return None
         with suppress(OverflowError, WorkError):
@@ -199,7 +200,7 @@ class DelayLMIBounds:
 
     def _proved(
         self, loop: LateLoop, b: Fraction, P: np.ndarray, tau: np.ndarray
-    ) -> tuple[DelayLMIBound, np.ndarray] | None:
+    ) -> tuple[DelayLMIBound, DecayOfAll] | None:
         """Return what a rounded function states, if it is proved."""
         exact, matrix = arithmetic(), [[Fraction(x) for x in row] for row in P.tolist()]
         each = [Fraction(x) for x in np.maximum(tau, _LEAST * tau.max(initial=1.0)).tolist()]
@@ -213,10 +214,10 @@ class DelayLMIBounds:
         residual = [rounded(x + y * left, BITS, up=True) for x, y in zip(moved, away, strict=True)]
         by_edge = dict(zip((e.edge for e in loop.channels), each, strict=True))
         edges = tuple(by_edge.get(k, Fraction(0)) for k in range(self.graph.n_edges))
-        y = root * self.case.highest(b)
-        inputs = np.array([float_up(x * y * _MORE) for x in lmi.inputs(*constants)]) + 1e-300
+        falling, nothing = [root * x for x in lmi.inputs(*constants)], [Fraction(0)] * self.graph.n_nodes
         bounds = (tuple(x) for x in (moved, away, residual))
-        return DelayLMIBound(b, tuple(map(tuple, matrix)), edges, left, *bounds), inputs
+        found = DelayLMIBound(b, tuple(map(tuple, matrix)), edges, left, *bounds)
+        return found, DecayOfAll(range(self.graph.n_nodes), b, None, left, away, moved, falling, nothing)
 
 
 def _dense(rows: Sequence[Row], width: int) -> np.ndarray:

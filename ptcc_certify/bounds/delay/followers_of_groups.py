@@ -20,8 +20,9 @@ import numpy as np
 from lmi.dyadic import round_to_bits
 from lmi.exact.decimal_rounding import float_up
 from lmi.exact.elementary_enclosures import log, rounded
-from ptcc_certify.bounds.delay.case import DecayingForm, LateCase
+from ptcc_certify.bounds.delay.case import DecayingForm, LateCase, Moments, moments
 from ptcc_certify.checker.input_formulas import BITS, root_above
+from ptcc_certify.checker.stated_bounds import DecayOfAll
 from ptcc_certify.graphs.structure import Structure
 
 #: Values of ``q`` that are tried, and the largest one; shares of the largest ``b``.
@@ -57,10 +58,9 @@ class Settling:
         """What bounds ``|x_k(T) - x_k*|``, ``(N,)`` floats from above."""
         return np.array([float_up(x * self.left) for x in self.u])
 
-    def deviation_bound(self, case: LateCase, t: np.ndarray) -> np.ndarray:
-        """Return what bounds ``|x_k - x_k*|`` at instants, ``(N, M)`` floats."""
-        u = np.array([float_up(x) for x in self.u])
-        return np.asarray(u[:, None] * case.decay(self.b, t, self.cap) * (1 + _MORE))
+    def over_time(self, case: LateCase, t: np.ndarray) -> Moments:
+        """Return what bounds ``|x_k - x_k*|`` at instants."""
+        return moments(case, self.b, self.u, [Fraction(0)] * len(self.u), t, self.cap)
 
 
 class SettlingBounds:
@@ -76,6 +76,8 @@ class SettlingBounds:
     def asked(case: LateCase) -> bool:
         """Tell whether leaders of a case form groups, and settle by themselves."""
         structure = case.structure
+        if case.messages.value_error or case.messages.own_delay:
+            return False
         if case.relative or not case.forms or not case.messages.age or not isinstance(structure, Structure):
             return False
         return bool(case.groups and structure.followers.size) and case.messages.leaders_hear_at_once(structure)
@@ -89,24 +91,17 @@ class SettlingBounds:
         self.W[graph.target, graph.source] = np.abs(graph.weights)
         self.shares[graph.target, graph.source] = 1 if case.shares is None else case.shares
 
-    def best(self) -> tuple[Settling, np.ndarray | None] | None:
-        """Return what leaves least at ``T``, under a cap with bounds of inputs; None if no function serves."""
+    def best(self) -> tuple[Settling, DecayOfAll] | None:
+        """Return what leaves least at ``T``, and what it says of all agents; None if no function serves."""
         found = [bound for one in self.case.forms for bound in self._tried(one)]
         if not found:
             return None
         best = min(found, key=lambda bound: float(max(bound.u) * bound.left))
-        return best, None if self.case.messages.gain_cap is None else self.inputs(best)
-
-    def inputs(self, bound: Settling) -> np.ndarray:
-        """Return what bounds ``|x_k'|`` up to ``T`` under a capped gain, ``(N,)`` floats from above."""
-        u, F, y = (
-            np.array([float_up(x) for x in bound.u]),
-            self.followers,
-            float_up(self.case.highest(bound.b, bound.cap)),
-        )
+        u, F, nothing = np.array([float_up(x) for x in best.u]), self.followers, [Fraction(0)] * self.D.size
         most = self.D * u + self.W @ u
-        most[F] = (2 * self.D[F] - float(bound.b)) * u[F]
-        return most * y * (1 + _MORE) + 1e-300
+        most[F] = (2 * self.D[F] - float(best.b)) * u[F]
+        falling = [Fraction(x) for x in (most * (1 + _MORE)).tolist()]
+        return best, DecayOfAll(range(u.size), best.b, best.cap, best.left, best.u, nothing, falling, nothing)
 
     def _tried(self, one: DecayingForm) -> Iterator[Settling]:
         """Yield bounds by one function, for some ``q`` and ``b``."""

@@ -26,6 +26,7 @@ from ptcc_certify.bounds.delay.decay_by_rows import MORE, RowBound, away, search
 from ptcc_certify.bounds.delay.decay_by_steps import Steps, bound_steps, search_steps
 from ptcc_certify.bounds.delay.delay_lmi import DelayLMIBound
 from ptcc_certify.bounds.delay.followers_of_groups import Settling
+from ptcc_certify.bounds.delay.forms_of_families import FamilyForm
 from ptcc_certify.bounds.delay.small_delays import SmallDelays
 from ptcc_certify.bounds.delay.staged_deadlines import stage_deadlines
 from ptcc_certify.bounds.float_conversion import floats, floats_up
@@ -38,7 +39,7 @@ from ptcc_certify.bounds.virtual_positions import (
     vehicles_section,
 )
 from ptcc_certify.checker.delay_lmi import LateLMIWitness
-from ptcc_certify.checker.delayed_forms import LateFormWitness, SettlingWitness
+from ptcc_certify.checker.delayed_forms import LateFamilyForm, LateFormWitness, SettlingWitness
 from ptcc_certify.checker.message_ages import Delays, Packets
 from ptcc_certify.checker.messages import MessagesSection, StepsStart
 from ptcc_certify.checker.missed_deadline import Signs
@@ -79,6 +80,9 @@ class LateBounds:
         What a Lyapunov function of the whole graph proves under a capped gain.
     lmi : DelayLMIBound or None
         What the delay LMI proves of the whole graph under a capped gain.
+    forms : tuple of FamilyForm
+        What Lyapunov functions of a family prove, component by component, of how far agents are from where they would
+        settle under the signal.
     longest_delay : float or None
         About the longest delay that such functions forgive: this certificate's limit. None if it was not asked.
     input : (N,) array or None
@@ -101,6 +105,7 @@ class LateBounds:
     residual: np.ndarray | None = None
     form: SmallDelays | None = None
     lmi: DelayLMIBound | None = None
+    forms: tuple[FamilyForm, ...] = ()
     longest_delay: float | None = None
     input: np.ndarray | None = None
     enough: Fraction | None = None
@@ -146,6 +151,24 @@ class LateBounds:
         return self.case.of.labels
 
     @property
+    def missing(self) -> str:
+        """What was not found, in words, where nothing is proved."""
+        of_groups = isinstance(self.structure, Family) and self.case.led_by_groups
+        return f"no {'Lyapunov function that bears it' if of_groups else 'vector for the followers'} was found"
+
+    @property
+    def whose(self) -> str:
+        """Of whom something is proved, in a word: agents, or followers where leaders move as they like."""
+        return "agent" if self.leaders is None or self.forms else "follower"
+
+    @property
+    def goal(self) -> str:
+        """What they are near to, in words."""
+        if self.forms:
+            return "where it would settle"
+        return "its final state" if self.leaders is None else f"its {self.leaders.goal}"
+
+    @property
     def followers(self) -> np.ndarray:
         """The agents that are bounded, ascending."""
         return self.case.followers
@@ -156,14 +179,14 @@ class LateBounds:
         return [*self.rows, *(() if self.steps is None else (self.steps,))]
 
     @property
-    def of_all(self) -> list[Settling | DelayLMIBound]:
+    def of_all(self) -> list[Settling | SmallDelays | DelayLMIBound | FamilyForm]:
         """What bounds deviations of all agents at every instant up to ``T``."""
-        return [one for one in (self.settling, self.lmi) if one is not None]
+        return [one for one in (self.settling, self.form, self.lmi, *self.forms) if one is not None]
 
     @property
     def says_something(self) -> bool:
         """Whether anything is proved."""
-        return bool(self.of_followers or self.of_all or self.form or self.missed or self.staged)
+        return bool(self.of_followers or self.of_all or self.missed or self.staged)
 
     @property
     def residuals(self) -> list[np.ndarray]:
@@ -183,8 +206,7 @@ class LateBounds:
 
     def __repr__(self) -> str:
         size = up(self.largest, 2) if self.largest else "0"
-        whose = ("agent", "final state") if self.leaders is None else ("follower", "target")
-        within = "nothing" if math.isinf(self.largest) else f"every {whose[0]} within {size} of its {whose[1]}"
+        within = "nothing" if math.isinf(self.largest) else f"every {self.whose} within {size} of {self.goal}"
         return f"LateBounds({self.messages!r}: {within} at T)"
 
     @property
@@ -195,10 +217,12 @@ class LateBounds:
     @property
     def after(self) -> float | None:
         """What bounds ``|x_k - x_k*|`` from ``T`` on where leaders move; None where they rest."""
-        if self.leaders is None:
+        if self.leaders is None or (self.vehicles is not None and not self.rows):
             return None
         if self.vehicles is not None:
             return self.vehicles.after(self.case, self.rows)
+        if self.forms:  # what decays goes on to do so
+            return self.largest
         return min((float(row.residual(after=True).max()) for row in self.rows), default=None)
 
     @cached_property
@@ -288,7 +312,7 @@ class LateBounds:
             return self.vehicles_over_time(t)[0][self.followers]
         least = np.full((self.followers.size, t.size), np.inf)
         bounds = [one.deviation_bound(self.case, t) for one in self.of_followers]
-        bounds += [one.deviation_bound(self.case, t)[self.followers] for one in self.of_all]
+        bounds += [one.over_time(self.case, t).bound[self.followers] for one in self.of_all]
         settled = self.direct & (t > float(self.case.protocol.T))
         return np.where(settled, 0.0, np.minimum.reduce([least, *bounds]))
 
@@ -298,7 +322,7 @@ class LateBounds:
         See :meth:`ptcc_certify.bounds.virtual_positions.VehicleBounds.over_time`.
         """
         assert self.vehicles is not None
-        position, velocity = self.vehicles.over_time(self.case, self.rows, t)
+        position, velocity = self.vehicles.over_time(self.case, [*self.rows, *self.of_all], t)
         if self.steps is not None and self.vehicles.input is not None:
             before = t <= float(self.case.protocol.T)
             steps = np.searchsorted([float(x) for x in self.steps.instants[1:-1]], t[before] * (1 - 1e-15))
@@ -321,7 +345,7 @@ class LateBounds:
         least = self.deviation_bound(t).max(axis=0, initial=0)
         if self.of_all:  # leaders deviate, too
             leaders = np.setdiff1d(np.arange(len(self.labels)), self.followers)
-            bounds = [one.deviation_bound(self.case, t)[leaders] for one in self.of_all]
+            bounds = [one.over_time(self.case, t).bound[leaders] for one in self.of_all]
             least = np.maximum(least, np.minimum.reduce(bounds).max(axis=0, initial=0))
         return np.asarray(least)
 
@@ -350,7 +374,7 @@ def bound_late(case: LateCase) -> LateBounds:
     messages, of_graph = case.messages, isinstance(case.structure, Structure)
     messages.latencies(case.of)
     bounds = LateBounds(case, case.relative)
-    if of_graph and (messages.own_delay or case.groups):
+    if (messages.own_delay or case.groups) if of_graph else case.led_by_groups:
         return bounds
     rows = late_rows(case)
     first, steps = away(case, rows), None
@@ -408,8 +432,13 @@ def late_obligations(late: LateBounds | None) -> Iterator[Obligation]:
         yield Obligation("late-settling", "messages.settling", {"q": settling.q, "b": settling.b}, witness)
     if (form := late.form) is not None:
         numbers = {"q": form.q, "b": form.b, "kap": form.kap}
-        phi = LateFormWitness(function=form.function, phi=Numbers(form.phi))
+        psi = None if form.psi is None else Numbers(form.psi)
+        phi = LateFormWitness(function=form.function, phi=Numbers(form.phi), psi=psi)
         yield Obligation("late-form", "messages.form", numbers, phi)
+    for i, one in enumerate(late.forms):
+        numbers = {"q": one.q, "b": one.b, "kap": one.kap}
+        phi = LateFormWitness(function=one.function, phi=Numbers(one.phi))
+        yield Obligation("late-form", f"messages.forms[{i}]", numbers, phi)
     if (lmi := late.lmi) is not None:
         floating: Any = [list(map(float, row)) for row in (*lmi.matrix, lmi.tau)]  # dyadic numbers, and short texts
         matrix = LateLMIWitness(matrix=floating[:-1], tau=floating[-1])
@@ -433,7 +462,8 @@ def delays(messages: LateMessages, of: SignedDigraph | Family) -> Delays:
 def messages_section(late: LateBounds) -> MessagesSection:
     """Return what is proved with late messages, as files have it."""
     proved: dict[str, Any] = {f.name: getattr(late, f.name) for f in declared(MessagesSection) if hasattr(late, f.name)}
-    proved |= {"vehicles": vehicles_section(late.vehicles), "staged": late.staged or None}
+    forms = [LateFamilyForm(nodes=np.array(one.nodes), initial=one.initial, left=one.left) for one in late.forms]
+    proved |= {"vehicles": vehicles_section(late.vehicles), "staged": late.staged or None, "forms": forms or None}
     return MessagesSection(**proved | vars(delays(late.messages, late.case.of)))
 
 
@@ -471,9 +501,20 @@ def read_late(
         form=_of_whole_graph(SmallDelays, section.form, proved.get(("late-form", "messages.form"))),
         lmi=_of_whole_graph(DelayLMIBound, section.lmi, proved.get(("late-lmi", "messages.lmi"))),
         settling=_of_whole_graph(Settling, section.settling, proved.get(("late-settling", "messages.settling"))),
+        forms=tuple(_read_forms(case, section, proved)),
         input=floats_up(section.input),
         vehicles=vehicles,
     )
+
+
+def _read_forms(case: LateCase, section: MessagesSection, proved: Any) -> Iterator[FamilyForm]:
+    """Yield what Lyapunov functions of a family prove."""
+    index = {label: v for v, label in enumerate(case.of.labels)} if section.forms else {}
+    for i, entry in enumerate(section.forms or ()):
+        step = proved["late-form", f"messages.forms[{i}]"]
+        witness, (q, b, kap) = step["witness"], (step[key] for key in ("q", "b", "kap"))
+        nodes, phi = tuple(index[label] for label in entry.nodes), tuple(witness.phi)
+        yield FamilyForm(witness.function, nodes, q, b, kap, phi, entry.initial, entry.left)
 
 
 def _of_whole_graph(kind: Any, section: Any, step: Any) -> Any:

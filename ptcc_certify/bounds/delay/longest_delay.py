@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
+from lmi.exact.decimal_rounding import float_up
 from ptcc_certify.bounds.delay.case import LateCase
+from ptcc_certify.bounds.delay.decay_by_rows import MORE
 from ptcc_certify.bounds.delay.delay_lmi import DelayLMIBounds
 from ptcc_certify.bounds.delay.followers_of_groups import SettlingBounds
+from ptcc_certify.bounds.delay.forms_of_families import forms_of_family, rest_of
 from ptcc_certify.bounds.delay.late_messages import LateBounds, bound_late
 from ptcc_certify.bounds.delay.small_delays import SmallDelayBounds
+from ptcc_certify.bounds.virtual_positions import vehicles_of_all
+from ptcc_certify.checker.signal_bounds import Function
+from ptcc_certify.checker.stated_bounds import DecayOfAll
+from ptcc_certify.theorems.family_behaviour import FamilyComponent
 
 #: Halvings of the interval, in powers of two, and digits of the delay that is returned.
 _HALVINGS, _DIGITS = 9, 3
@@ -45,11 +52,33 @@ def longest_forgiven(case: LateCase) -> float | None:
 def with_forms(late: LateBounds) -> LateBounds:
     """Add what the best Lyapunov functions of the whole graph prove."""
     kinds: dict[str, Any] = {"settling": SettlingBounds, "form": SmallDelayBounds, "lmi": DelayLMIBounds}
+    decays = []
     for name, kind in kinds.items():
         if kind.asked(late.case) and (found := kind(late.case).best()) is not None:
-            bound, inputs = found
-            least = [x for x in (late.input, inputs) if x is not None]
-            late = replace(late, input=np.minimum.reduce(least) if least else None, **{name: bound})
+            bound, decay = found
+            decays.append(decay)
+            late = replace(late, **{name: bound})
+    return _with_decays(late, decays)
+
+
+def with_forms_of_family(late: LateBounds, parts: Sequence[tuple[FamilyComponent, Sequence[Function]]]) -> LateBounds:
+    """Add what Lyapunov functions of a family prove, where it has groups of leaders."""
+    forms = forms_of_family(late.case, parts)
+    if not forms:
+        return late
+    decays, residual = [*(one.decay for one in forms), rest_of(late.case, forms)], np.zeros(len(late.labels))
+    for decay in decays:
+        residual[list(decay.nodes)] = [float_up(x * decay.left) for x in decay.away]
+    return _with_decays(replace(late, forms=forms, residual=residual * MORE), decays)
+
+
+def _with_decays(late: LateBounds, decays: Sequence[DecayOfAll]) -> LateBounds:
+    """Add what decays say of inputs, and of vehicles."""
+    if late.messages.gain_cap is not None:
+        least = [x for x in (late.input, *map(late.case.inputs, decays)) if x is not None]
+        late = replace(late, input=np.minimum.reduce(least) if least else None)
+    if late.messages.vehicles is not None and late.vehicles is None and decays:
+        late = replace(late, vehicles=vehicles_of_all(late.case, decays))
     return late
 
 

@@ -7,25 +7,33 @@ E'P E`` of rate ``r``, ``e_k^2 <= c_k V``, ``q >= e^(b h)`` and
 
 ``sqrt(V(t)) <= e^(-b s(t)) sqrt(V(0))``, ``s`` the capped clock; and the agents are drawn to a state that differs from
 ``Q X(0)`` by at most ``(h q/b) |Q| B phi sqrt(V(0))``. Nothing settles at ``T``.
+
+Where values are off by ``error``, with ``off = h B psi + error D``, ``D`` the sums of ``|w_kl|``, and
+
+    psi_k >= sqrt(c_k) f + off_k,    f r/2 >= sqrt(off' |L'P L| off)
+
+``f`` is added to the root, and ``|Q| off s(T)`` to how far agents are drawn off. Where nothing is late or off the same
+is said without a cap: it is what holds of the graph as it stands.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
 
-from lmi.exact.decimal_rounding import float_up
 from lmi.exact.elementary_enclosures import exp, rounded
-from ptcc_certify.bounds.delay.case import DecayingForm, LateCase
-from ptcc_certify.checker.input_formulas import BITS, root_above
+from ptcc_certify.bounds.delay.case import DecayingForm, LateCase, Moments, moments
+from ptcc_certify.checker.input_formulas import BITS, Limits, root_above
+from ptcc_certify.checker.stated_bounds import DecayOfAll
 from ptcc_certify.graphs.structure import Structure
 
 #: Halvings of the interval of ``b``, and of the longest delay.
 _HALVINGS = 40
-#: Room for rounding, relatively.
-_MORE = 1e-9
+#: Room for rounding, relatively; of what errors add.
+_MORE, _ROOM = 1e-9, 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +48,12 @@ class SmallDelays:
     phi : tuple of N Fraction
     left : Fraction
         ``e^(-b s(T))`` from above.
-    moved, residual : tuple of N Fraction
-        How far from ``Q X(0)`` agents are drawn to, and are at ``T``, from above.
+    moved, away, residual : tuple of N Fraction
+        How far from ``Q X(0)`` agents are drawn to up to ``T``, what beside that decays of their deviations, where they
+        are at first, and how far from ``Q X(0)`` they are at ``T``, from above.
+    floor : Fraction or None
+        ``f``; None where no value is off.
+    psi : tuple of N Fraction, or None
     """
 
     function: int
@@ -51,54 +63,75 @@ class SmallDelays:
     phi: tuple[Fraction, ...]
     left: Fraction
     moved: tuple[Fraction, ...]
+    away: tuple[Fraction, ...]
     residual: tuple[Fraction, ...]
+    floor: Fraction | None = None
+    psi: tuple[Fraction, ...] | None = None
+
+    def over_time(self, case: LateCase, t: np.ndarray) -> Moments:
+        """Return what bounds ``|x_k - (Q X(0))_k|`` at instants."""
+        return moments(case, self.b, self.away, self.moved, t)
 
 
 class SmallDelayBounds:
-    """Bounds of one graph under one capped gain.
+    """Bounds of one graph under one capped gain, or where nothing is late or off.
 
     Parameters
     ----------
     case : LateCase
-        With a ``gain_cap``, an exact influence, and an initial state.
+        With an exact influence, and an initial state.
     """
 
     @staticmethod
     def asked(case: LateCase) -> bool:
         """Tell whether such bounds are asked of a case."""
-        return case.of_whole_graph and bool(case.forms)
+        messages = case.messages
+        known = not (messages.value_error and messages.own_delay)
+        return case.of_whole_graph and known and (messages.exact or messages.gain_cap is not None) and bool(case.forms)
 
     def __init__(self, case: LateCase):
         n, own, cap = case.graph.n_nodes, case.messages.own_delay, case.messages.gain_cap
-        assert case.influence is not None and cap is not None
-        self.case, self.cap, self.influence = case, cap, case.influence
+        assert case.influence is not None
+        self.case, self.influence, self.late = case, case.influence, (cap or Fraction(0)) * case.messages.age
+        self.far = Fraction(0) if cap is None else Limits(cap).clock_above(case.protocol.gain.exact)
         self.B = [{v: abs(x) for v, x in row.items() if own or v != k} for k, row in enumerate(case.rows)]
         self._B = np.array([[float(row.get(v, 0)) for v in range(n)] for row in self.B])
         self._L = np.array([[float(row.get(v, 0)) for v in range(n)] for row in case.rows])
 
-    def best(self) -> tuple[SmallDelays, np.ndarray] | None:
-        """Return what leaves least at ``T``, with bounds of inputs; None if no function forgives this delay."""
-        found = [(bound, one) for one in self.case.forms if (bound := self.bound(one)) is not None]
-        if not found:
-            return None
-        bound, one = min(found, key=lambda pair: max(pair[0].residual))
-        return bound, self.inputs(one, bound)
+    def best(self) -> tuple[SmallDelays, DecayOfAll] | None:
+        """Return what leaves least at ``T``, times the largest input, and what it says of all agents.
+
+        Where nothing is left, of the fastest function. None if no function forgives this delay.
+        """
+        found = [self._decay(one, bound) for one in self.case.forms if (bound := self.bound(one)) is not None]
+        return min(found, key=self._cost, default=None)
+
+    def _decay(self, one: DecayingForm, bound: SmallDelays) -> tuple[SmallDelays, DecayOfAll]:
+        root, nothing = self._root(one), (Fraction(0),) * len(bound.phi)
+        falling = [root * x for x in bound.phi]
+        moved, psi, nodes = bound.moved, bound.psi or nothing, range(len(falling))
+        return bound, DecayOfAll(nodes, bound.b, None, bound.left, bound.away, moved, falling, psi)
+
+    def _cost(self, found: tuple[SmallDelays, DecayOfAll]) -> tuple[float, float]:
+        bound, decay = found
+        push = 1.0 if self.case.messages.gain_cap is None else float(self.case.inputs(decay).max())
+        return float(max(bound.residual)) * push, -float(bound.b)
 
     def longest_delay(self) -> float:
         """Return the longest delay that some function forgives, about: this certificate's limit, not the loop's."""
-        longest = 0.0
+        longest, cap = 0.0, float(self.case.messages.gain_cap or math.inf)
         for one in self.case.forms:
-            low, high = 0.0, float(one.form.rate) / float(self.cap)
+            low, high = 0.0, float(one.form.rate) / cap
             weights = self._weights(one)
             for _ in range(_HALVINGS):
                 middle = (low + high) / 2
-                low, high = (middle, high) if self._largest_b(one, weights, middle * float(self.cap)) else (low, middle)
+                low, high = (middle, high) if self._largest_b(one, weights, middle * cap) else (low, middle)
             longest = max(longest, low)
         return longest
 
     def bound(self, one: DecayingForm) -> SmallDelays | None:
         """Return what one function proves; None if it does not forgive this delay."""
-        h = self.cap * self.case.messages.age
+        h = self.late
         guess = self._largest_b(one, self._weights(one), float(h))
         if not guess:
             return None
@@ -112,17 +145,32 @@ class SmallDelayBounds:
         kap = Fraction(self._kap(self._weights(one), np.array([float(x) for x in pushed])) * (1 + _MORE))
         left = self.case.left(b)
         root = self._root(one)
-        moved, residual = list[Fraction](), list[Fraction]()
+        floor, psi, off = self._errors(one)
+        walks = [h * q / b * root * x + self.far * y for x, y in zip(pushed, off, strict=True)]
+        moved, away, residual = list[Fraction](), list[Fraction](), list[Fraction]()
         for k, c in enumerate(one.deviations):
-            share = sum((abs(Fraction(x)) * pushed[v] for v, x in self.influence.row(k).items()), Fraction(0))
-            moved.append(rounded(h * q / b * share * root, BITS, up=True))
-            residual.append(rounded(moved[-1] + root_above(c * (1 + Fraction(_MORE))) * root * left, BITS, up=True))
-        return SmallDelays(one.function, q, b, kap, tuple(exact), left, tuple(moved), tuple(residual))
+            share = sum((abs(Fraction(x)) * walks[v] for v, x in self.influence.row(k).items()), Fraction(0))
+            size = root_above(c * (1 + Fraction(_MORE)))
+            moved.append(rounded(share + size * floor, BITS, up=True))
+            away.append(rounded(size * root, BITS, up=True))
+            residual.append(rounded(moved[-1] + away[-1] * left, BITS, up=True))
+        found = SmallDelays(one.function, q, b, kap, tuple(exact), left, tuple(moved), tuple(away), tuple(residual))
+        return found if psi is None else replace(found, floor=floor, psi=psi)
 
-    def inputs(self, one: DecayingForm, bound: SmallDelays) -> np.ndarray:
-        """Return what bounds ``|x_k'| <= g phi_k sqrt(V(0)) e^(-b s)`` up to ``T``, ``(N,)`` floats from above."""
-        y = self._root(one) * self.case.highest(bound.b)
-        return np.array([float_up(x * y) for x in bound.phi]) * (1 + _MORE) + 1e-300
+    def _errors(self, one: DecayingForm) -> tuple[Fraction, tuple[Fraction, ...] | None, list[Fraction]]:
+        """Return ``f``, ``psi`` and ``off`` of a function that forgives the delay: nothing where no value is off."""
+        error, n = self.case.messages.value_error, len(one.errors)
+        if not error:
+            return Fraction(0), None, [Fraction(0)] * n
+        late, weights, D = float(self.late), self._weights(one), self._B.sum(axis=1)
+        first = np.sqrt([float(c) for c in one.errors]) * (1 + _MORE)
+        # psi = f a + c, with a = sqrt(c) + h B a and c = error D + h B c
+        a, c = (np.linalg.solve(np.eye(n) - late * self._B, x) for x in (first, float(error) * D))
+        pushed, rate = self._kap(weights, late * (self._B @ a)), float(one.form.rate) / 2
+        floor = self._kap(weights, late * (self._B @ c) + float(error) * D) / (rate - pushed) * (1 + _ROOM)
+        psi = [rounded(Fraction(x), BITS, up=True) for x in ((floor * a + c) * (1 + _ROOM)).tolist()]
+        off = [sum((self.late * x * psi[v] + error * x for v, x in row.items()), Fraction(0)) for row in self.B]
+        return Fraction(floor) * (1 + Fraction(_ROOM)), tuple(psi), off
 
     def _root(self, one: DecayingForm) -> Fraction:
         """Bound ``sqrt(V(0))`` from above."""

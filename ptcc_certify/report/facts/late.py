@@ -101,19 +101,18 @@ def _vehicles(certificate: Certificate, late: LateBounds) -> Facts:
 
 def _tracking(late: LateBounds, leaders: MovingLeaders, at: Fraction | None) -> Facts:
     """Tell how followers track leaders that move, of which they hear at once."""
-    goal, head = leaders.goal, "tracking" if leaders.total else "limited"  # where a cap is all that was asked
+    head = "tracking" if leaders.total else "limited"  # where a cap is all that was asked
     if leaders.total or leaders.sign_gain is not None:
         yield Fact(head="leaders", note=leaders_text(leaders))
-    if not late.rows:
-        text = "nothing is proved: no vector for the followers was found"
-        yield Fact(head=head, standing="unproved", note=text, loud=True)
+    if not late.says_something:
+        yield Fact(head=head, standing="unproved", note=f"nothing is proved: {late.missing}", loud=True)
         return
     protocol, after = late.case.protocol, late.after or 0.0
     if (cap := late.messages.gain_cap) is not None:
         yield Fact(head=head, note=f"gain <= {near(cap)}{': under a cap nothing settles' if late.largest else ''}")
-    where = f"within {up(late.largest, 2)} of its" if late.largest else "on its"
+    where = f"within {up(late.largest, 2)} of {late.goal}" if late.largest else f"on {late.goal}"
     then = f"within {up(after, 2)} of it from then on" if after else "and ever after"
-    text = f"every follower {where} {goal} at T = {near(protocol.T)}, {then}"
+    text = f"every {late.whose} {where} at T = {near(protocol.T)}, {then}"
     yield Fact(head=head, note=text, brief=(f"{text};",))
     instants = {"0.9 T": protocol.T * 9 / 10, "0.99 T": protocol.T * 99 / 100}
     if at is not None:
@@ -235,8 +234,8 @@ def _within_text(late: LateBounds, digits: int) -> str:
     """
     if not late.largest:
         return f"every {'agent exactly at its final state' if late.leaders is None else 'follower on its target'} at T"
-    text = f"every agent within {up(late.largest, digits)} of its final state at T"
-    if late.leaders is not None:
+    text = f"every agent within {up(late.largest, digits)} of {late.goal} at T"
+    if late.leaders is not None and not late.forms:
         at_deadline = late.largest if late.after is None else min(late.largest, late.after)
         text = f"every follower within {up(at_deadline, digits)} of its target at T"
         text += "" if late.after is None else f", within {up(late.after, digits)} from then on"
