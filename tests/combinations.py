@@ -1,4 +1,4 @@
-"""What goes together: every pair of what may be asked, tried on one small team, and the page that tells.
+"""What goes together: every pair of what may be asked, tried on two small teams, and the page that tells.
 
 ``python tests/combinations.py`` writes docs/guide/what-goes-together.md anew, from what the program says.
 """
@@ -12,12 +12,14 @@ from pathlib import Path
 from typing import Any
 
 import ptcc_certify as ptcc
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import HypothesisError, ParameterError
 
 PAGE = Path(__file__).parents[1] / "docs" / "guide" / "what-goes-together.md"
-DAY = ptcc.SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1), ("b", "d", 2)])
-NIGHT = ptcc.SignedDigraph.from_edges([("a", "b", 2), ("a", "c", -1), ("c", "d", -1)])
-BOTH = {"day": DAY, "night": NIGHT}
+DAY = [("a", "b", 1), ("b", "c", -1), ("b", "d", 2)]
+NIGHT = [("a", "b", 2), ("a", "c", -1), ("c", "d", -1)]
+#: The two teams: what leaders hear besides, by the words of the page.
+TEAMS = {"a leads alone": [], "a and b hear each other": [("b", "a", 1)]}
+BOTH = object()
 START = {"a": 1, "b": 4, "c": -2, "d": 3}
 NOMINAL = ptcc.NominalProtocol(T=1, rho1=1, rho2=6, kappa=1)
 SLIDING = ptcc.SlidingModeProtocol(T_r="0.1", T_s=1, rho1=1, rho2=6, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
@@ -49,10 +51,12 @@ KINDS = {
     "asks": ptcc.Asks,
 }
 PAIRS = list(combinations(PARTS, 2))
+Pair = tuple[str, str]
 
 
-def outcome(*names: str) -> str:
-    """Certify the team with some parts: ``yes``, ``open`` if one of them is left open, or why they are refused."""
+def outcome(*names: str, team: str = "a leads alone") -> str:
+    """Certify a team with some parts: ``yes``, ``open`` if one of them is left open, or why they are refused."""
+    day, night = (ptcc.SignedDigraph.from_edges([*edges, *TEAMS[team]]) for edges in (DAY, NIGHT))
     asked: dict[str, Any] = {"asks": {"simulation": False}}
     for key, value in (item for name in names for item in PARTS[name].items()):
         if key in KINDS:
@@ -63,15 +67,16 @@ def outcome(*names: str) -> str:
         asked["agents"] = {**asked["agents"], **asked.pop("limits")}  # a cap of agents of order n is their own
     try:
         words = {key: KINDS[key](**value) if key in KINDS else value for key, value in asked.items()}
-        made = ptcc.certify(words.pop("graph", DAY), words.pop("protocol", NOMINAL), START, **words)
-    except ParameterError as error:
+        graph = {"day": day, "night": night} if words.pop("graph", None) is BOTH else day
+        made = ptcc.certify(graph, words.pop("protocol", NOMINAL), START, **words)
+    except (ParameterError, HypothesisError) as error:
         return str(error)
     return {0: "yes", 4: "open"}[int(made.assessment.exit_code)]
 
 
 def drawn_together() -> list[tuple[str, ...]]:
     """Return 40 triples and 20 quadruples, drawn at random of those of which every pair is certified."""
-    known = told()
+    known = told("a leads alone")
     drawn: list[tuple[str, ...]] = []
     for size, count in ((3, 40), (4, 20)):
         pool = [some for some in combinations(PARTS, size) if all(known[p] == "yes" for p in combinations(some, 2))]
@@ -84,28 +89,30 @@ def letter(number: int) -> str:
     return (letter(number // 26 - 1) if number >= 26 else "") + chr(ord("a") + number % 26)
 
 
-def page(outcomes: dict[tuple[str, str], str]) -> str:
-    """Return the page that tells the outcome of every pair, and each reason once."""
-    names, reasons = list(PARTS), list(dict.fromkeys(x for x in outcomes.values() if x not in ("yes", "open")))
+def page(outcomes: dict[str, dict[Pair, str]]) -> str:
+    """Return the page that tells the outcome of every pair for every team, and each reason once."""
+    said = (x for pairs in outcomes.values() for x in pairs.values() if x not in ("yes", "open"))
+    names, reasons = list(PARTS), list(dict.fromkeys(said))
     signs = {"yes": "+", "open": "~", **{reason: letter(k) for k, reason in enumerate(reasons)}}
-    lines = [
-        INTRODUCTION,
-        "| | | " + " | ".join(map(str, range(1, len(names)))) + " |",
-        "|---" * (len(names) + 1) + "|",
-    ]
-    for k, name in enumerate(names):
-        cells = [signs[outcomes[other, name]] for other in names[:k]]
-        lines.append(f"| {k + 1} | {name} | " + " | ".join(cells + [""] * (len(names) - 1 - k)) + " |")
-    lines += ["", "What is refused, in the program's own words:", "", "| | |", "|---|---|"]
+    lines = [INTRODUCTION]
+    for team, pairs in outcomes.items():
+        lines += [f"## Where {team}", ""]
+        lines += ["| | | " + " | ".join(map(str, range(1, len(names)))) + " |", "|---" * (len(names) + 1) + "|"]
+        for k, name in enumerate(names):
+            cells = [signs[pairs[other, name]] for other in names[:k]]
+            lines.append(f"| {k + 1} | {name} | " + " | ".join(cells + [""] * (len(names) - 1 - k)) + " |")
+        lines.append("")
+    lines += ["## What is refused, in the program's own words", "", "| | |", "|---|---|"]
     lines += [f"| {signs[reason]} | {reason.replace('|', '&#124;')} |" for reason in reasons]
     return "\n".join(lines) + "\n"
 
 
 INTRODUCTION = """# What goes together
 
-Every pair of what may be asked, tried on one team of four: `+` is certified; of `~` the program takes the question, and
-left a part of it open on this team; a letter names why it is refused. Of three and four that go together in pairs, 60
-drawn at random were certified together. The reasons are in the words of Python; commands name their own options.
+Every pair of what may be asked, tried on a team of four, then on the same team where the leader hears a follower, so
+that nobody leads alone: `+` is certified; of `~` the program takes the question, and left a part of it open on this
+team; a letter names why it is refused. Of three and four that go together in pairs on the first team, 60 drawn at
+random were certified together. The reasons are in the words of Python; commands name their own options.
 
 ```sh
 printf 'a,b,1\\nb,c,-1\\nb,d,2\\n' > team.csv
@@ -114,11 +121,12 @@ ptcc certify team.csv --rho2 6 --uncertainty 10% --leader-speed 0.1 --gain-cap 5
 """
 
 
-def told() -> dict[tuple[str, str], str]:
-    """Read from the page what it tells of every pair."""
+def told(team: str) -> dict[Pair, str]:
+    """Read from the page what it tells of every pair for a team."""
     text = PAGE.read_text("utf-8")
+    table = text.partition(f"## Where {team}\n")[2].partition("\n## ")[0]
     rows = [
-        [cell.strip() for cell in line.strip("|").split("|")] for line in re.findall(r"^\| [0-9]+ \|.*$", text, re.M)
+        [cell.strip() for cell in line.strip("|").split("|")] for line in re.findall(r"^\| [0-9]+ \|.*$", table, re.M)
     ]
     reasons = {"+": "yes", "~": "open"} | dict(re.findall(r"^\| ([a-z]+) \| (.*) \|$", text, re.M))
     names = [row[1] for row in rows]
@@ -128,4 +136,4 @@ def told() -> dict[tuple[str, str], str]:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(page({pair: outcome(*pair) for pair in PAIRS}), "utf-8")
+    PAGE.write_text(page({team: {pair: outcome(*pair, team=team) for pair in PAIRS} for team in TEAMS}), "utf-8")

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import pytest
-from combinations import PAGE, PAIRS, PARTS, drawn_together, outcome, page, told
+from combinations import PAGE, PAIRS, PARTS, TEAMS, drawn_together, outcome, page, told
 
 
 def test_the_page_is_written_of_what_it_tells():
-    assert list(told()) == sorted(PAIRS, key=lambda pair: (list(PARTS).index(pair[1]), list(PARTS).index(pair[0])))
-    assert page({pair: told()[pair] for pair in PAIRS}) == PAGE.read_text("utf-8")
+    both = {team: told(team) for team in TEAMS}
+    for pairs in both.values():
+        assert list(pairs) == sorted(PAIRS, key=lambda pair: (list(PARTS).index(pair[1]), list(PARTS).index(pair[0])))
+    assert page({team: {pair: pairs[pair] for pair in PAIRS} for team, pairs in both.items()}) == PAGE.read_text("utf-8")
 
 
 @pytest.mark.few(6)
+@pytest.mark.parametrize("team", TEAMS)
 @pytest.mark.parametrize(("one", "other"), PAIRS)
-def test_a_pair_goes_together_as_the_page_tells(one: str, other: str):
-    assert outcome(one, other) == told()[one, other]
+def test_a_pair_goes_together_as_the_page_tells(one: str, other: str, team: str):
+    assert outcome(one, other, team=team) == told(team)[one, other]
 
 
 @pytest.mark.few(2)
