@@ -10,7 +10,9 @@ def test_the_page_is_written_of_what_it_tells():
     both = {team: told(team) for team in TEAMS}
     for pairs in both.values():
         assert list(pairs) == sorted(PAIRS, key=lambda pair: (list(PARTS).index(pair[1]), list(PARTS).index(pair[0])))
-    assert page({team: {pair: pairs[pair] for pair in PAIRS} for team, pairs in both.items()}) == PAGE.read_text("utf-8")
+    assert page({team: {pair: pairs[pair] for pair in PAIRS} for team, pairs in both.items()}) == PAGE.read_text(
+        "utf-8"
+    )
 
 
 @pytest.mark.few(6)

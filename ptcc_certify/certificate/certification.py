@@ -240,10 +240,10 @@ def _read_family(case: Case) -> Family:
         asked, mend, messages = "leaders that move", "leave it out", case.messages
         if messages is not None:
             asked, late = messages.asked, messages.age > 0 and messages.gain_cap is None
-            if messages.at_rest and not late:
+            if messages.at_rest and not late and (messages.settles or messages.vehicles is None):
                 leading_group(family, asked)
                 return family
-            mend = "add a gain cap" if messages.at_rest else mend
+            mend = "add a gain cap" if messages.at_rest and late else mend
         refuse_other_targets(family, asked, mend)
     return family
 

@@ -135,6 +135,12 @@ class FamilyFunction:
         (values,), scale = integers([[root_above(c) for c in self.inputs.values()]])
         return [(dict(zip(self.inputs, values, strict=True)), Fraction(1, scale))]
 
+    @cached_property
+    def sizes(self) -> list[Scaled]:
+        """Bounds of ``|xi_k| / sqrt(V)``."""
+        (values,), scale = integers([[root_above(c) for c in self.coordinates.values()]])
+        return [(dict(zip(self.coordinates, values, strict=True)), Fraction(1, scale))]
+
     def root(self, x: Sequence[Fraction]) -> Fraction:
         """Bound ``sqrt(V)`` of a state."""
         return root_above(self.value(x))

@@ -129,11 +129,18 @@ def check_form(doc: Document, messages: Messages, verified: Verified, section: L
 
 @dataclass(frozen=True, kw_only=True)
 class LateFamilyForm:
-    """A function of a component of a family under small delays: its root at first, and the share that is left."""
+    """A function of a component of a family under small delays: its root at first, and the share that is left.
+
+    Where values are off or agents disturbed how far agents may be from where their leaders are, over the root, what
+    errors make of it, and what disturbances add to it per unit of time.
+    """
 
     nodes: Nodes
     initial: NotNegative
     left: Fraction
+    sizes: FewAgents | None = None
+    floor: NotNegative | None = None
+    push: NotNegative | None = None
 
 
 def check_forms_of_family(
@@ -144,25 +151,32 @@ def check_forms_of_family(
     begin: Begin,
     entries: Sequence[LateFamilyForm],
 ) -> list[DecayOfAll]:
-    """Verify ``V <= e^(-b s) initial`` for every signal, ``|x_k'| <= g phi_k V``, of components of a family.
+    """Verify ``sqrt(V) <= e^(-b s) initial`` for every signal, ``|e_k| <= phi_k sqrt(V)``, of components of a family.
 
-    Return decays to where every agent would settle under the signal; agents whom nobody hears, and who hear nobody,
-    rest.
+    Return decays to where every agent would settle under the signal, where values are off or agents disturbed to where
+    its leaders are; agents whom nobody hears, and who hear nobody, keep to themselves.
     """
     doc.at = "messages.forms"
     cap, state, leaders = messages.gain_cap, begin.state, messages.leaders
     if state is None:
         raise RejectedError("forms without an initial state")
-    still = leaders is None or (leaders.speed == leaders.disturbance == 0 and leaders.sign_gain is None)
-    need(still and messages.value_error == 0, "forms though leaders move, agents are disturbed, or values are off")
+    still = leaders is None or (leaders.speed == 0 and leaders.sign_gain is None)
+    need(still, "forms though leaders move, or with a sign term")
     need(cap is not None or not messages.delay, "forms without a cap, though something is late")
     need(not messages.late and bool(entries), "forms of a late own state, or none")
+    disturbance = Fraction(0) if leaders is None else leaders.disturbance
+    wrong = messages.value_error + disturbance * messages.delay
     late, x, decays, graph = (cap or 0) * messages.delay, list(state), [], family.modes[0].structure.graph
     for i, entry in enumerate(entries):
         of = doc.at = f"messages.forms[{i}]"
         obligation = doc.open("late-form", of)
         q, b, kap, witness = (obligation[key] for key in ("q", "b", "kap", "witness"))
-        need(0 <= witness.function < len(functions) and witness.psi is None, "no such Lyapunov function, or psi")
+        need(0 <= witness.function < len(functions), "no such Lyapunov function")
+        told = [x is not None for x in (entry.floor, witness.psi, entry.push, entry.sizes)]
+        asked = [wrong > 0, wrong > 0, disturbance > 0, wrong > 0 or disturbance > 0]
+        need(
+            told == asked, "floor and psi are told iff values are off, push iff agents are disturbed, sizes iff either"
+        )
         V = functions[witness.function]
         nodes = V.component.nodes
         need(positions(doc, graph, entry.nodes, "nodes of forms") == nodes, "nodes are not those of the function")
@@ -171,10 +185,12 @@ def check_forms_of_family(
         spend(30 * len(nodes) * len(family.modes), bits, bits, "small delays")
         need(b > 0 and b * late <= LARGEST_GROWTH and q >= exp(b * late)[1], "b is not positive, or q below e^(b h)")
         speeds, unit = least(V.speeds)
-        pushes = []
-        for mode in family.modes:
-            edges = ((edge[0], edge[1], Fraction(edge[4], mode.unit)) for edge in mode.edges if edge[1] in phi)
-            pushes.append(heard_in_mode(edges, phi))
+        heard = [
+            [(edge[0], edge[1], Fraction(edge[4], mode.unit)) for edge in mode.edges if edge[1] in phi]
+            for mode in family.modes
+        ]
+        sums = [heard_in_mode(edges, dict.fromkeys(nodes, Fraction(1))) for edges in heard]
+        pushes = [heard_in_mode(edges, phi) for edges in heard]
         for v in nodes:
             most = Fraction(speeds.get(v, 0), unit) + lag * max(push[v] for push in pushes)
             need(phi[v] >= most, f"phi of agent {shorten(family.labels[v])} is too small")
@@ -182,9 +198,32 @@ def check_forms_of_family(
         need(b + lag * kap <= V.rate / 2, "the delay takes more than the rate")
         need(entry.initial >= V.root([x[v] for v in range(len(x))]), "initial is not proved")
         need_left_at_deadline(messages, b, entry.left)
-        falling = [phi[v] * entry.initial for v in nodes]
-        none = [Fraction(0)] * len(nodes)
-        decays.append(DecayOfAll(nodes, b, None, entry.left, [y / b for y in falling], none, falling, none))
+        falling, standing = {v: phi[v] * entry.initial for v in nodes}, dict.fromkeys(nodes, Fraction(0))
+        away, floor, drive = [y / b for y in falling.values()], list(standing.values()), Fraction(0)
+        if wrong:
+            psi, f = {v: witness.psi[v] for v in nodes}, entry.floor or Fraction(0)
+            pushes = [
+                {v: late * x + wrong * D[v] for v, x in heard_in_mode(edges, psi).items()}
+                for edges, D in zip(heard, sums, strict=True)
+            ]
+            for v in nodes:
+                most = Fraction(speeds.get(v, 0), unit) * f + max(push[v] for push in pushes)
+                need(psi[v] >= most, f"psi of agent {shorten(family.labels[v])} is too small")
+            need(all((f * V.rate / 2) ** 2 >= V.largest(push) for push in pushes), "floor is too small")
+            standing = psi
+        if entry.push is not None:
+            need(entry.push**2 >= V.largest(dict.fromkeys(nodes, disturbance)), "push is too small")
+            drive = entry.push * formulas.drift_above(messages.gain, b, cap)
+            most = entry.push / (b * messages.least_gain())
+            standing = {v: y + phi[v] * most for v, y in standing.items()}
+        if entry.sizes is not None:
+            sizes, (own, unit) = [entry.sizes[v] for v in nodes], least(V.sizes)
+            for v, size in zip(nodes, sizes, strict=True):
+                need(size >= Fraction(own.get(v, 0), unit), f"size of agent {shorten(family.labels[v])} is too small")
+            away = [size * entry.initial for size in sizes]
+            floor = [size * ((entry.floor or 0) + drive) for size in sizes]
+        moved = falling.values(), standing.values()
+        decays.append(DecayOfAll(nodes, b, None, entry.left, away, floor, *map(list, moved)))
         doc.done(f"b = {down(b)}")
     rest = sorted(set(range(len(x))) - {end for mode in family.modes for edge in mode.edges for end in edge[:2]})
     first, none = decays[0], [Fraction(0)] * len(rest)

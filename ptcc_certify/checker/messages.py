@@ -118,6 +118,10 @@ def check_messages(
     if section.vehicles is not None:
         need(bool(section.rows) or whole, "vehicles without rows, settling, form and lmi")
         need(not protocol.sliding, "vehicles under the sliding-mode protocol")
+        need(
+            section.forms is None or not messages.value_error,
+            "vehicles of a family with forms, and values that are off",
+        )
         vehicles = Vehicles(doc, messages, section.vehicles)
     stated, decays = [one for one in (residual, inputs, vehicles) if one is not None], list[DecayOfAll]()
     if by_rows:

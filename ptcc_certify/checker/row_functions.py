@@ -101,6 +101,14 @@ class FollowerFunction:
         """None."""
         return ()
 
+    @property
+    def sizes(self) -> list[Scaled]:
+        """Bounds of ``|xi_k| / W``, of all agents but pivots and those at rest."""
+        pivots = set(self.component.pivots.values())
+        led = {v: b for part in self.parts for v, b in part.bounds.items() if v not in pivots}
+        (values,), scale = integers([list(led.values())])
+        return [(self.vector, Fraction(1, self.scale)), (dict(zip(led, values, strict=True)), Fraction(1, scale))]
+
     def root(self, x: Sequence[Fraction]) -> Fraction:
         """Return ``W`` of a state, rounded up."""
         xi, unit = self.component.coordinates(list(self.vector), x)

@@ -68,6 +68,10 @@ class Function(Protocol):
         """Bounds of ``|(L X)_k| / sqrt(V)`` for every member; a node may be in several vectors."""
 
     @property
+    def sizes(self) -> Sequence[Scaled]:
+        """Bounds of ``|xi_k| / sqrt(V)``, of pivots and agents at rest 0 or left out."""
+
+    @property
     def means(self) -> Sequence[WeightedMean]:
         """Weighted means, with their constants."""
 

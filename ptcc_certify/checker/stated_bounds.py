@@ -239,11 +239,21 @@ class Inputs:
         return gain_above(self.messages.gain, self.gain_cap, b, cap)
 
     def of_all(self, decay: DecayOfAll) -> None:
-        """Mark what is at least ``falling_k sup g e^(-b s) + gain_cap standing_k``, under a cap."""
+        """Mark what is at least ``falling_k sup g e^(-b s) + gain_cap standing_k``, under a cap.
+
+        Without one, where nothing is late or off: ``g(0) falling_k + b g(0) standing_k (rho1 T + k)/(p - 1)``, ``p = b
+        k``, for what stands is then what drives add at most, over ``b g(0)``.
+        """
+        gain, p = self.messages.gain, decay.b * self.messages.gain.k
+        (falling, standing), scale = integers([decay.falling, decay.standing])
         if self.gain_cap is not None:
-            (falling, standing), scale = integers([decay.falling, decay.standing])
-            y = self._gain_above(decay.b, decay.cap)
-            self.stated.meet(decay.nodes, (y / scale, falling), (self.gain_cap / scale, standing))
+            y, steady = self._gain_above(decay.b, decay.cap), self.gain_cap
+        elif not self.messages.delay and not self.messages.value_error and (p > 1 or (p == 1 and not any(standing))):
+            y = self.messages.least_gain()
+            steady = decay.b * y * (gain.rho1 * gain.T + gain.k) / (p - 1) if p > 1 else Fraction(0)
+        else:
+            return
+        self.stated.meet(decay.nodes, (y / scale, falling), (steady / scale, standing))
 
     def close(self, doc: Document) -> None:
         """Verify that a bound meets what is stated of every agent."""

@@ -125,6 +125,14 @@ class WeightedSquares:
         (values,), scale = integers([[root_above(Fraction(x * self.scale, divisor)) for x in most.values()]])
         return [(dict(zip(p, values, strict=True)), Fraction(1, scale))]
 
+    @property
+    def sizes(self) -> list[Scaled]:
+        """Bounds of ``|x_k| / sqrt(V)``."""
+        spend(EACH_ROOT * len(self.weights), what="bounds of many agents")
+        inverse = (root_above(Fraction(self.scale, weight)) for weight in self.weights.values())
+        (values,), scale = integers([list(inverse)])
+        return [(dict(zip(self.weights, values, strict=True)), Fraction(1, scale))]
+
     def root(self, x: Sequence[Fraction]) -> Fraction:
         """Bound ``sqrt(V)`` of a state."""
         return root_above(self._value(x))

@@ -30,13 +30,10 @@ from lmi.dyadic import dyadic_array, round_array, round_to_bits
 from lmi.exact import arithmetic
 from lmi.exact.decimal_rounding import down
 from lmi.exact.definite import SparseFactor
-from lmi.exact.numbers import integers
 from lmi.search_time import checkpoint
 from lmi.sparse_definiteness_proofs import prove_sparse_positive_definite
 from lmi.sparse_h_matrix import FILL_ROWS, fill_core, solve
-from ptcc_certify.checker.common_forms import Scaled
 from ptcc_certify.checker.family import Edge
-from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.checker.weighted_squares import WeightedSquares
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.rationals import nearest_float
@@ -79,13 +76,6 @@ class SquaresFunction(WeightedSquares):
     def vector(self) -> np.ndarray:
         """``p`` in floats, which are exact."""
         return np.array([weight / self.scale for weight in self.weights.values()])
-
-    @property
-    def sizes(self) -> list[Scaled]:
-        """Bounds of ``|x_k| / sqrt(V)``."""
-        inverse = (root_above(Fraction(self.scale, weight)) for weight in self.weights.values())
-        (values,), scale = integers([list(inverse)])
-        return [(dict(zip(self.weights, values, strict=True)), Fraction(1, scale))]
 
 
 def squares_function(family: Family, notes: list[str] | None = None) -> SquaresFunction | None:

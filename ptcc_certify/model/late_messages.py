@@ -191,9 +191,13 @@ lambda of L, or measure the own state without delay
 
     @property
     def at_rest(self) -> bool:
-        """Whether leaders that hear nobody rest, nothing disturbs anybody, and no value is off."""
-        leaders = self.leaders
-        return not self.value_error and (leaders is None or (not leaders.total and leaders.sign_gain is None))
+        """Whether leaders that hear nobody rest, and no sign term acts."""
+        return self.leaders is None or (not self.leaders.speed and self.leaders.sign_gain is None)
+
+    @property
+    def settles(self) -> bool:
+        """Whether nothing disturbs anybody, and no value is off."""
+        return not self.value_error and (self.leaders is None or not self.leaders.total)
 
     @property
     def asked(self) -> str:

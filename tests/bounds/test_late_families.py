@@ -321,8 +321,8 @@ def test_other_limits_of_families_are_refused(more: dict[str, Any]):
     with pytest.raises(ParameterError, match="families take one gain cap alone"):
         certify(UNSURE, PROTOCOL, [1, 2, -3], **more)
     group, asked = Family.from_intervals([(1, 2, 1, 2), (2, 1, 1, 2)]), GainLimits(gain_cap=9)
-    with pytest.raises(HypothesisError, match=r"with inexact messages.*leads and hears others: leave it out"):
-        certify(group, PROTOCOL, limits=asked, asks=Asks(noise=1))
+    with pytest.raises(HypothesisError, match=r"with leaders that move.*leads and hears others: leave it out"):
+        certify(group, PROTOCOL, limits=asked, leaders=MovingLeaders(speed=1))
     with pytest.raises(HypothesisError, match=r"with late messages.*leads and hears others: add a gain cap"):
         certify(group, PROTOCOL, messages=LateMessages("0.01"))
 

@@ -255,9 +255,19 @@ class LateCase:
         return gain_above(self.protocol.gain.exact, self.messages.gain_cap, b, cap)
 
     def inputs(self, decay: DecayOfAll) -> np.ndarray:
-        """Return what a decay says of ``|x_k'|`` up to ``T`` under a cap of the gain, ``(N,)`` floats from above."""
-        y, cap = self.highest(decay.b, decay.cap), self.messages.gain_cap or Fraction(0)
-        bounds = [float_up(x * y + cap * n) for x, n in zip(decay.falling, decay.standing, strict=True)]
+        """Return what a decay says of ``|x_k'|`` up to ``T``, ``(N,)`` floats from above.
+
+        Under a cap of the gain, or where nothing is late or off, of a decay that is fast enough; else infinite.
+        """
+        gain, p = self.exact.gain, decay.b * self.exact.gain.k
+        if (cap := self.messages.gain_cap) is not None:
+            y, steady = self.highest(decay.b, decay.cap), cap
+        elif p > 1 or (p == 1 and not any(decay.standing)):
+            y = self.exact.least_gain()
+            steady = decay.b * y * (gain.rho1 * gain.T + gain.k) / (p - 1) if p > 1 else Fraction(0)
+        else:
+            return np.full(len(self.of.labels), np.inf)
+        bounds = [float_up(x * y + steady * n) for x, n in zip(decay.falling, decay.standing, strict=True)]
         return self.of_nodes(decay.nodes, np.array(bounds) * (1 + 1e-9) + 1e-300)
 
     def of_nodes(self, nodes: Sequence[int], bounds: np.ndarray) -> np.ndarray:

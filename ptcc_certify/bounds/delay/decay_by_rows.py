@@ -83,16 +83,8 @@ class RowBound:
 
         After ``T`` the gain is low again: from what they added by then they add ever more, at most ``after``.
         """
-        b, T, added = float(self.witness.b), float(case.protocol.T), np.zeros(t.shape)
-        if case.push:
-            push, cap = float(case.push) / float(self.witness.u.min()), case.least_cap(self.cap)
-            before = push * drift_integral(case.protocol.gain, b, cap, np.append(t, T))
-            low = case.exact.least_gain(always=True)
-            rate = b * float(low if cap is None else min(low, cap))
-            grown = -np.expm1(-rate * np.maximum(t - T, 0))
-            later = before[-1] * (1 - grown) + push / rate * grown
-            added = np.where(t > T, np.minimum(later, float(self.after or 0)), before[:-1])
-        return case.decay(self.witness.b, t, self.cap), added
+        push = float(case.push) / float(self.witness.u.min())
+        return driven(case, self.witness.b, push, self.cap, float(self.after or 0), t)
 
     def deviation_bound(self, case: LateCase, t: np.ndarray) -> np.ndarray:
         """Return what bounds ``|x_k - x_k*|`` of followers at instants, ``(F, M)`` floats."""
@@ -134,6 +126,24 @@ def _decayed(remaining: np.ndarray, p: float) -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(remaining > 0, (1 - remaining ** (p - 1)) / (p - 1) if p != 1 else -np.log(remaining), 0.0)
     return np.asarray(remaining * np.maximum(share, 0))
+
+
+def driven(
+    case: LateCase, b: Fraction, push: float, cap: Fraction | None, after: float, t: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return ``y = e^(-b s_c)``, and what ``push`` per unit of time adds to what decays like it, (M,) floats each.
+
+    After ``T`` the gain is low again: from what was added by then ever more is, at most ``after``.
+    """
+    T, added = float(case.protocol.T), np.zeros(t.shape)
+    if push:
+        least, low = case.least_cap(cap), case.exact.least_gain(always=True)
+        before = push * drift_integral(case.protocol.gain, float(b), least, np.append(t, T))
+        rate = float(b) * float(low if least is None else min(low, least))
+        grown = -np.expm1(-rate * np.maximum(t - T, 0))
+        later = before[-1] * (1 - grown) + push / rate * grown
+        added = np.where(t > T, np.minimum(later, after), before[:-1])
+    return case.decay(b, t, cap), added
 
 
 def drift_integral(gain: Gain, b: float, cap: Fraction | None, t: np.ndarray) -> np.ndarray:

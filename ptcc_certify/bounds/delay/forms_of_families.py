@@ -3,25 +3,35 @@
 With ``sqrt(V)`` a norm that decays at ``r/2`` for every signal, ``|(L X)_k| <= c_k sqrt(V)`` for every member, ``B_i``
 the largest ``|w_kl|`` of mode ``i``, ``h = G delay``, ``q >= e^(b h)`` and
 
-    phi_k >= c_k + h q max_i (B_i phi)_k,    kap^2 >= V of all states with |x_k| <= (B_i phi)_k,    b + h q kap <= r/2
+    phi_k >= c_k + h q max_i (B_i phi)_k,    kap >= sqrt(V) of all |x_k| <= (B_i phi)_k,    b + h q kap <= r/2
 
 ``sqrt(V) <= e^(-b s) sqrt(V(0))`` and ``|x_k'| <= g phi_k e^(-b s) sqrt(V(0))``: every agent is within ``(phi_k / b)
 e^(-b s) sqrt(V(0))`` of where it would settle under the signal. Without a cap the same holds where nothing is late:
 there agents settle at ``T``.
+
+Where values are off by ``error``, agents are disturbed by ``|d_k| <= delta``, or both, nothing settles. With ``wrong =
+error + delta delay``, ``off_i = h B_i psi + wrong D_i`` and
+
+    psi_k >= c_k f + max_i off_i,    f r/2 >= sqrt(V) of all |x_k| <= off_i,    push >= sqrt(V) of all |x_k| <= delta
+
+``f + push int_0^t e^(-b (s(t) - s(r))) dr`` is added to the root of ``V``, which bounds how far agents are from where
+their leaders are: ``|x_k - sum_j B_kj x_j| <= size_k sqrt(V)``, ``B`` the common kernel, ``j`` its pivots.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
 
+from lmi.exact.decimal_rounding import float_up
 from lmi.exact.elementary_enclosures import exp, rounded
-from ptcc_certify.bounds.delay.case import LateCase, Moments, moments
+from ptcc_certify.bounds.delay.case import LateCase, Moments
+from ptcc_certify.bounds.delay.decay_by_rows import driven
 from ptcc_certify.checker.delayed_forms import Edge, heard_in_mode
-from ptcc_certify.checker.input_formulas import BITS, root_above
+from ptcc_certify.checker.input_formulas import BITS, drift_above, root_above
 from ptcc_certify.checker.signal_bounds import Function, least
 from ptcc_certify.checker.stated_bounds import DecayOfAll
 from ptcc_certify.graphs.family import Family, Mode
@@ -29,8 +39,8 @@ from ptcc_certify.theorems.family_behaviour import FamilyComponent
 
 #: Agents of a component for whose functions delays are tried, and halvings of the interval of ``b``.
 LARGEST, _HALVINGS = 120, 25
-#: Room for rounding, relatively.
-_MORE = 1e-9
+#: Room for rounding, relatively; of what errors add.
+_MORE, _ROOM = 1e-9, 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +60,9 @@ class FamilyForm:
         ``sqrt(V(0))`` from above.
     left : Fraction
         ``e^(-b s(T))`` from above.
+    floor, push : Fraction or None
+        What errors add to the root, and disturbances per unit of time; None where there are none.
+    sizes, psi : tuple of N Fraction, or None
     """
 
     function: int
@@ -60,13 +73,25 @@ class FamilyForm:
     phi: tuple[Fraction, ...]
     initial: Fraction
     left: Fraction
+    floor: Fraction | None = None
+    push: Fraction | None = None
+    sizes: tuple[Fraction, ...] | None = None
+    psi: tuple[Fraction, ...] | None = None
 
-    @property
-    def decay(self) -> DecayOfAll:
-        """What it says of the agents of the component."""
-        falling, nothing = [self.phi[v] * self.initial for v in self.nodes], [Fraction(0)] * len(self.nodes)
-        away = [y / self.b for y in falling]
-        return DecayOfAll(self.nodes, self.b, None, self.left, away, nothing, falling, nothing)
+    def decay(self, case: LateCase) -> DecayOfAll:
+        """Return what it says of the agents of the component."""
+        chosen, b, push, zero = self.nodes, self.b, self.push or Fraction(0), Fraction(0)
+        falling, standing = [self.phi[v] * self.initial for v in chosen], [zero] * len(chosen)
+        away, floor = [y / b for y in falling], [zero] * len(chosen)
+        if self.psi is not None:
+            standing = [self.psi[v] for v in chosen]
+        if push:
+            most = push / (b * case.exact.least_gain())
+            standing = [x + self.phi[v] * most for v, x in zip(chosen, standing, strict=True)]
+        if self.sizes is not None:
+            at_T = (self.floor or 0) + push * drift_above(case.protocol.gain.exact, b, case.messages.gain_cap)
+            away, floor = ([self.sizes[v] * x for v in chosen] for x in (self.initial, at_T))
+        return DecayOfAll(chosen, b, None, self.left, away, floor, falling, standing)
 
     def over_time(self, case: LateCase, t: np.ndarray) -> Moments:
         """Return what bounds how far agents are from where they would settle at instants.
@@ -74,12 +99,21 @@ class FamilyForm:
         Infinite of those of other components, 0 of agents whom nobody hears, and who hear nobody.
         """
         assert isinstance(case.structure, Family)
-        decay, (sources, listeners, _) = self.decay, case.structure.union
-        found = moments(case, self.b, decay.away, decay.floor, t)
-        decaying, standing = (case.of_nodes(self.nodes, x) for x in (found.decaying, found.standing))
+        decay, (sources, listeners, _) = self.decay(case), case.structure.union
+        y, added = driven(case, self.b, float(self.push or 0), None, self.after(case), t)
+        first, sizes = (
+            np.array([[float_up(x)] for x in (values or [Fraction(0)] * len(self.nodes))])
+            for values in (decay.away, None if self.sizes is None else [self.sizes[v] for v in self.nodes])
+        )
+        standing = sizes * float_up(self.floor or Fraction(0))
+        decaying, standing = (case.of_nodes(self.nodes, x) for x in (first * y + sizes * added, standing))
         alone = np.setdiff1d(np.arange(len(decaying)), np.concatenate([sources, listeners]))
         decaying[alone] = standing[alone] = 0
-        return Moments(found.b, found.y, decaying, standing)
+        return Moments(float(self.b), y, decaying, standing)
+
+    def after(self, case: LateCase) -> float:
+        """Return what disturbances add to the root at all times."""
+        return float_up((self.push or Fraction(0)) / (self.b * case.exact.least_gain(always=True)))
 
 
 def forms_of_family(
@@ -115,8 +149,9 @@ def rest_of(case: LateCase, forms: Sequence[FamilyForm]) -> DecayOfAll:
 
 
 def _cost(found: FamilyForm) -> tuple[float, float]:
-    most = float(max(found.phi) * found.initial)
-    return most / float(found.b) * float(found.left), most
+    most, rest = float(max(found.phi) * found.initial), float(max(found.sizes or (Fraction(0),)))
+    stays = float(found.floor or 0) + float(found.push or 0) / float(found.b)
+    return most / float(found.b) * float(found.left) + rest * stays, most
 
 
 def _bound(case: LateCase, component: FamilyComponent, V: Function, number: int) -> Iterator[FamilyForm]:
@@ -135,7 +170,30 @@ def _bound(case: LateCase, component: FamilyComponent, V: Function, number: int)
         for v, x in zip(chosen, phi, strict=True):
             whole[v] = x
         initial = rounded(V.root([state[v] for v in chosen]), BITS, up=True)
-        yield FamilyForm(number, tuple(chosen), q, b, kap, tuple(whole), initial, case.left(b))
+        found = FamilyForm(number, tuple(chosen), q, b, kap, tuple(whole), initial, case.left(b))
+        yield found if case.messages.settles else _with_errors(case, found, tried)
+
+
+def _with_errors(case: LateCase, found: FamilyForm, tried: _Tried) -> FamilyForm:
+    """Add what errors of values and disturbances make of it."""
+    disturbance = Fraction(0) if case.leaders is None else case.leaders.disturbance
+    wrong = case.messages.value_error + disturbance * case.messages.age
+    V, n, more = tried.V, len(found.nodes), Fraction(1) + Fraction(_ROOM)
+    own, unit = least(V.sizes)
+
+    def whole(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
+        by_node = dict(zip(found.nodes, values, strict=True))
+        return tuple(by_node.get(v, Fraction(0)) for v in range(len(found.phi)))
+
+    sizes = whole([rounded(Fraction(own.get(v, 0), unit) * more, BITS, up=True) for v in range(n)])
+    found = replace(found, sizes=sizes)
+    if disturbance:
+        push = root_above(V.largest(dict.fromkeys(range(n), disturbance)))
+        found = replace(found, push=rounded(push * more, BITS, up=True))
+    if wrong:
+        floor, psi = tried.errors(wrong)
+        found = replace(found, floor=floor, psi=whole(psi))
+    return found
 
 
 def _edges(mode: Mode) -> list[Edge]:
@@ -163,6 +221,25 @@ class _Tried:
         kap = rounded(root_above(max(self.V.largest(push) for push in pushes)), BITS, up=True)
         return (q, kap, phi) if b + self.late * q * kap <= self.V.rate / 2 else None
 
+    def errors(self, wrong: Fraction) -> tuple[Fraction, list[Fraction]]:
+        """Return ``f`` and ``psi``, for values that are off by ``wrong``: ``psi = f a + c`` by two fixed points."""
+        n, ones = len(self.first), dict.fromkeys(range(len(self.first)), Fraction(1))
+        sums = [heard_in_mode(edges, ones) for edges in self.modes]
+        heard = [float(wrong * max(D[v] for D in sums)) for v in range(n)]
+        a, c = (self._solved(float(self.late), np.array(x, dtype=float)) for x in (self.first, heard))
+        assert a is not None and c is not None, "the delay is forgiven"
+        rise, start = (
+            max(
+                self.V.largest({v: self.late * y + off * D[v] for v, y in heard_in_mode(edges, x).items()})
+                for edges, D in zip(self.modes, sums, strict=True)
+            )
+            for x, off in ((_exact(a), Fraction(0)), (_exact(c), wrong))
+        )
+        rate, more = self.V.rate / 2, Fraction(1) + Fraction(_ROOM)
+        floor = rounded(root_above(start) / (rate - root_above(rise)) * more * more, BITS, up=True)
+        pairs = zip(_exact(a).values(), _exact(c).values(), strict=True)
+        return floor, [rounded((floor * x + y) * more, BITS, up=True) for x, y in pairs]
+
     def largest_b(self, rate: float) -> float:
         """Return about the largest ``b`` that is proved; 0 if there is none."""
         low, high = 0.0, rate
@@ -176,6 +253,11 @@ class _Tried:
         """Return ``phi`` with some room; None if it is too large."""
         first = np.array([float(x) for x in self.first]) * (1 + _MORE)
         first += _MORE * first.max(initial=0.0) * (lag > 0)
+        phi = self._solved(lag, first)
+        return None if phi is None else list(_exact(phi * (1 + _MORE)).values())
+
+    def _solved(self, lag: float, first: np.ndarray) -> np.ndarray | None:
+        """Return the solution of ``phi = first + lag max_i B_i phi``; None if there is none."""
         phi = first
         if lag:
             n, heard = first.size, np.zeros((len(self.modes), first.size, first.size))
@@ -194,4 +276,8 @@ class _Tried:
                 phi = np.linalg.solve(np.eye(n) - lag * most, first)
             if not (np.isfinite(phi).all() and (phi >= first).all()):
                 return None
-        return [rounded(Fraction(x), BITS, up=True) for x in (phi * (1 + _MORE)).tolist()]
+        return phi
+
+
+def _exact(values: np.ndarray) -> dict[int, Fraction]:
+    return {v: rounded(Fraction(x), BITS, up=True) for v, x in enumerate(values.tolist())}

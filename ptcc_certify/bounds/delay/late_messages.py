@@ -165,7 +165,7 @@ class LateBounds:
     def goal(self) -> str:
         """What they are near to, in words."""
         if self.forms:
-            return "where it would settle"
+            return "where it would settle" if self.messages.settles else "where its leaders are"
         return "its final state" if self.leaders is None else f"its {self.leaders.goal}"
 
     @property
@@ -221,9 +221,15 @@ class LateBounds:
             return None
         if self.vehicles is not None:
             return self.vehicles.after(self.case, self.rows)
-        if self.forms:  # what decays goes on to do so
-            return self.largest
+        if self.forms:
+            return self._after_by_forms
         return min((float(row.residual(after=True).max()) for row in self.rows), default=None)
+
+    @property
+    def _after_by_forms(self) -> float:
+        """What bounds the same from ``T`` on by forms: what decays goes on to do so, what drives add grows."""
+        times = np.concatenate([[1.0], np.geomspace(1.001, 1e9, 200)]) * float(self.case.protocol.T)
+        return float(self.largest_bound(times).max())
 
     @cached_property
     def never_below(self) -> float | None:
@@ -437,7 +443,8 @@ def late_obligations(late: LateBounds | None) -> Iterator[Obligation]:
         yield Obligation("late-form", "messages.form", numbers, phi)
     for i, one in enumerate(late.forms):
         numbers = {"q": one.q, "b": one.b, "kap": one.kap}
-        phi = LateFormWitness(function=one.function, phi=Numbers(one.phi))
+        psi = None if one.psi is None else Numbers(one.psi)
+        phi = LateFormWitness(function=one.function, phi=Numbers(one.phi), psi=psi)
         yield Obligation("late-form", f"messages.forms[{i}]", numbers, phi)
     if (lmi := late.lmi) is not None:
         floating: Any = [list(map(float, row)) for row in (*lmi.matrix, lmi.tau)]  # dyadic numbers, and short texts
@@ -462,9 +469,16 @@ def delays(messages: LateMessages, of: SignedDigraph | Family) -> Delays:
 def messages_section(late: LateBounds) -> MessagesSection:
     """Return what is proved with late messages, as files have it."""
     proved: dict[str, Any] = {f.name: getattr(late, f.name) for f in declared(MessagesSection) if hasattr(late, f.name)}
-    forms = [LateFamilyForm(nodes=np.array(one.nodes), initial=one.initial, left=one.left) for one in late.forms]
+    forms = [_form_section(one) for one in late.forms]
     proved |= {"vehicles": vehicles_section(late.vehicles), "staged": late.staged or None, "forms": forms or None}
     return MessagesSection(**proved | vars(delays(late.messages, late.case.of)))
+
+
+def _form_section(one: FamilyForm) -> LateFamilyForm:
+    """Return what a Lyapunov function of a family proves, as files have it."""
+    sizes = None if one.sizes is None else Numbers(one.sizes)
+    told: dict[str, Any] = {"initial": one.initial, "left": one.left, "floor": one.floor, "push": one.push}
+    return LateFamilyForm(nodes=np.array(one.nodes), sizes=sizes, **told)
 
 
 def read_late(
@@ -514,7 +528,9 @@ def _read_forms(case: LateCase, section: MessagesSection, proved: Any) -> Iterat
         step = proved["late-form", f"messages.forms[{i}]"]
         witness, (q, b, kap) = step["witness"], (step[key] for key in ("q", "b", "kap"))
         nodes, phi = tuple(index[label] for label in entry.nodes), tuple(witness.phi)
-        yield FamilyForm(witness.function, nodes, q, b, kap, phi, entry.initial, entry.left)
+        sizes, psi = (None if one is None else tuple(one) for one in (entry.sizes, witness.psi))
+        said = entry.initial, entry.left, entry.floor, entry.push, sizes, psi
+        yield FamilyForm(witness.function, nodes, q, b, kap, phi, *said)
 
 
 def _of_whole_graph(kind: Any, section: Any, step: Any) -> Any:

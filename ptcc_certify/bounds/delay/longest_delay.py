@@ -66,17 +66,20 @@ def with_forms_of_family(late: LateBounds, parts: Sequence[tuple[FamilyComponent
     forms = forms_of_family(late.case, parts)
     if not forms:
         return late
-    decays, residual = [*(one.decay for one in forms), rest_of(late.case, forms)], np.zeros(len(late.labels))
+    decays = [*(one.decay(late.case) for one in forms), rest_of(late.case, forms)]
+    residual = np.zeros(len(late.labels))
     for decay in decays:
-        residual[list(decay.nodes)] = [float_up(x * decay.left) for x in decay.away]
+        at_T = (x * decay.left + y for x, y in zip(decay.away, decay.floor, strict=True))
+        residual[list(decay.nodes)] = [float_up(x) for x in at_T]
     return _with_decays(replace(late, forms=forms, residual=residual * MORE), decays)
 
 
 def _with_decays(late: LateBounds, decays: Sequence[DecayOfAll]) -> LateBounds:
     """Add what decays say of inputs, and of vehicles."""
-    if late.messages.gain_cap is not None:
+    if late.messages.gain_cap is not None or (late.forms and late.messages.exact):
         least = [x for x in (late.input, *map(late.case.inputs, decays)) if x is not None]
-        late = replace(late, input=np.minimum.reduce(least) if least else None)
+        bound = np.minimum.reduce(least) if least else None
+        late = replace(late, input=None if bound is None or np.isinf(bound).any() else bound)
     if late.messages.vehicles is not None and late.vehicles is None and decays:
         late = replace(late, vehicles=vehicles_of_all(late.case, decays))
     return late

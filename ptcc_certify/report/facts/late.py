@@ -110,7 +110,8 @@ def _tracking(late: LateBounds, leaders: MovingLeaders, at: Fraction | None) -> 
     protocol, after = late.case.protocol, late.after or 0.0
     if (cap := late.messages.gain_cap) is not None:
         yield Fact(head=head, note=f"gain <= {near(cap)}{': under a cap nothing settles' if late.largest else ''}")
-    where = f"within {up(late.largest, 2)} of {late.goal}" if late.largest else f"on {late.goal}"
+    where = f"within {up(late.largest, 2)} of" if late.largest else "exactly" if late.forms else "on"
+    where += f" {late.goal}"
     then = f"within {up(after, 2)} of it from then on" if after else "and ever after"
     text = f"every {late.whose} {where} at T = {near(protocol.T)}, {then}"
     yield Fact(head=head, note=text, brief=(f"{text};",))
