@@ -313,11 +313,8 @@ def decays(data: Json) -> tuple[list[dict[str, Any]], list[str]]:
                 ones = map(np.array, itertools.product([-1, 1], repeat=n))
                 push = disturbance * max(np.sqrt(s @ norm @ s) for s in ones)
                 holds["push"] = float(number(told["push"])) >= push * (1 - 1e-9)
-                gain = data["problem"]["gain"]
-                g0 = min(
-                    float(number(gain["rho1"])) + float(number(gain["rho2"])),
-                    float(number(said.get("gain_cap", "1e9"))),
-                )
+                first = sum(float(number(data["problem"]["gain"][key])) for key in ("rho1", "rho2"))
+                g0 = min(first, float(number(said.get("gain_cap", "1e9"))))
                 one["standing"] = psi + phi * push / (b * g0)
             if error or disturbance:
                 sizes = np.zeros(n)
