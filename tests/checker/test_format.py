@@ -157,8 +157,11 @@ def test_the_schema_is_a_strict_schema():
         "TrackedSection": {"inputs", "initial", "drive"},
         "MessagesSection": {
             *("packets", "gain_cap", "leaders", "steps", "residual", "missed", "staged", "settling", "form", "lmi"),
-            *("input", "vehicles"),
+            *("forms", "input", "vehicles"),
         },
+        "LateForm": {"floor"},
+        "LateFormWitness": {"psi"},
+        "LateFamilyForm": {"sizes", "floor", "push"},
         "Moving": {"sign_gain"},
         "RowsBound": {"cap", "clock", "drift", "after"},
         "VehiclesSection": {"velocity", "input"},

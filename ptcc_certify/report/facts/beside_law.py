@@ -33,7 +33,10 @@ def beside_law(certificate: Certificate) -> list[str]:
         rest = "leaders are at rest; of those that move was asked:"
         driven = "; followers then move by x_k' = u_k + d_k" if leaders.disturbance > 0 else ""
         what = rest if leaders.speed else "nothing disturbs; asked was:"
-        told.append(f"Here {what} {leaders_text(leaders).removeprefix('at rest; ')}{driven}.")
+        text = leaders_text(leaders).removeprefix("at rest; ")
+        if certificate.proof.late is not None and certificate.proof.late.forms:  # of agents that all follow each other
+            text, driven = (words.replace("followers", "agents") for words in (text, driven))
+        told.append(f"Here {what} {text}{driven}.")
     if certificate.noise is not None:
         told.append(f"With noise e_k is that of x + n, any |n_k| <= {near(certificate.noise)}.")
     if limits:

@@ -40,7 +40,7 @@ def late_facts(certificate: Certificate) -> Facts:
     yield from _vehicles(certificate, late)
     yield Fact(head="messages", note=messages_text(late.messages, certificate.protocol))
     if late.leaders is not None:
-        yield Fact(head="leaders", note=leaders_text(late.leaders))
+        yield _pushed(late, late.leaders)
     told = [*_impossible(late), *([] if late.direct else _left(late)), *_stages(late), *_kept_off(late)]
     if (at := certificate.at) is not None and (late.of_followers or late.of_all):
         bound = float(late.largest_bound([float(at)])[0])
@@ -103,7 +103,7 @@ def _tracking(late: LateBounds, leaders: MovingLeaders, at: Fraction | None) -> 
     """Tell how followers track leaders that move, of which they hear at once."""
     head = "tracking" if leaders.total else "limited"  # where a cap is all that was asked
     if leaders.total or leaders.sign_gain is not None:
-        yield Fact(head="leaders", note=leaders_text(leaders))
+        yield _pushed(late, leaders)
     if not late.says_something:
         yield Fact(head=head, standing="unproved", note=f"nothing is proved: {late.missing}", loud=True)
         return
@@ -131,6 +131,13 @@ def _tracking(late: LateBounds, leaders: MovingLeaders, at: Fraction | None) -> 
         yield Fact(head="input", standing="unproved", note=note, loud=True)
     if late.largest and (by_agent := _residual_text(late)):
         yield Fact(head="left", note=f"at T by agent: {by_agent}", detail=True)
+
+
+def _pushed(late: LateBounds, leaders: MovingLeaders) -> Fact:
+    """Tell how fast leaders move, and what disturbs others; where leaders hear each other all who listen."""
+    if late.forms:
+        return Fact(head="disturbed", note=f"any |d_k| <= {near(leaders.disturbance)} of all who listen")
+    return Fact(head="leaders", note=leaders_text(leaders))
 
 
 def leaders_text(leaders: MovingLeaders) -> str:
