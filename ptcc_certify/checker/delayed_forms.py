@@ -6,11 +6,11 @@ settle as they do without delays, and followers that hear of them late by rows.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import chain
-from typing import Any, Protocol
+from typing import Any
 
 from lmi.exact.decimal_rounding import down
 from lmi.exact.elementary_enclosures import exp
@@ -19,35 +19,20 @@ from lmi.exact.work import spend
 from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.digraph import Digraph, edges_of
 from ptcc_certify.checker.document import Document
-from ptcc_certify.checker.family import Component, Family
 from ptcc_certify.checker.follower_rows import away_of
-from ptcc_certify.checker.graph import positions, proved_above
+from ptcc_certify.checker.graph import proved_above
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.lyapunov_form import Form
 from ptcc_certify.checker.matrix_products import quadratic
 from ptcc_certify.checker.message_ages import Messages, need_left
-from ptcc_certify.checker.protocol import Begin
 from ptcc_certify.checker.reading import RejectedError, length, need
-from ptcc_certify.checker.section_declarations import FewAgents, Nodes, NotNegative, Positive
+from ptcc_certify.checker.section_declarations import FewAgents, Positive
 from ptcc_certify.checker.side_files import Numbers
-from ptcc_certify.checker.signal_bounds import Function, least
 from ptcc_certify.checker.stated_bounds import DecayOfAll
 from ptcc_certify.checker.structure import Structure
 
 #: Largest ``b gain_cap delay``; what is larger asks for a ``q`` that nothing allows.
 LARGEST_GROWTH = 1000
-
-
-#: Source, target, and the largest size of its weight.
-Edge = tuple[int, int, Fraction]
-
-
-class FunctionOfSignals(Function, Protocol):
-    """A Lyapunov function of a component of a family."""
-
-    @property
-    def component(self) -> Component:
-        """Whose it is."""
 
 
 @dataclass(frozen=True)
@@ -127,109 +112,6 @@ def check_form(doc: Document, messages: Messages, verified: Verified, section: L
     return DecayOfAll(nodes, b, None, left, list(away), list(moved), [root * x for x in phi], list(standing))
 
 
-@dataclass(frozen=True, kw_only=True)
-class LateFamilyForm:
-    """A function of a component of a family under small delays: its root at first, and the share that is left.
-
-    Where values are off or agents disturbed how far agents may be from where their leaders are, over the root, what
-    errors make of it, and what disturbances add to it per unit of time.
-    """
-
-    nodes: Nodes
-    initial: NotNegative
-    left: Fraction
-    sizes: FewAgents | None = None
-    floor: NotNegative | None = None
-    push: NotNegative | None = None
-
-
-def check_forms_of_family(
-    doc: Document,
-    messages: Messages,
-    family: Family,
-    functions: Sequence[FunctionOfSignals],
-    begin: Begin,
-    entries: Sequence[LateFamilyForm],
-) -> list[DecayOfAll]:
-    """Verify ``sqrt(V) <= e^(-b s) initial`` for every signal, ``|e_k| <= phi_k sqrt(V)``, of components of a family.
-
-    Return decays to where every agent would settle under the signal, where values are off or agents disturbed to where
-    its leaders are; agents whom nobody hears, and who hear nobody, keep to themselves.
-    """
-    doc.at = "messages.forms"
-    cap, state, leaders = messages.gain_cap, begin.state, messages.leaders
-    if state is None:
-        raise RejectedError("forms without an initial state")
-    still = leaders is None or (leaders.speed == 0 and leaders.sign_gain is None)
-    need(still, "forms though leaders move, or with a sign term")
-    need(cap is not None or not messages.delay, "forms without a cap, though something is late")
-    need(not messages.late and bool(entries), "forms of a late own state, or none")
-    disturbance = Fraction(0) if leaders is None else leaders.disturbance
-    wrong = messages.value_error + disturbance * messages.delay
-    late, x, decays, graph = (cap or 0) * messages.delay, list(state), [], family.modes[0].structure.graph
-    for i, entry in enumerate(entries):
-        of = doc.at = f"messages.forms[{i}]"
-        obligation = doc.open("late-form", of)
-        q, b, kap, witness = (obligation[key] for key in ("q", "b", "kap", "witness"))
-        need(0 <= witness.function < len(functions), "no such Lyapunov function")
-        told = [x is not None for x in (entry.floor, witness.psi, entry.push, entry.sizes)]
-        asked = [wrong > 0, wrong > 0, disturbance > 0, wrong > 0 or disturbance > 0]
-        need(
-            told == asked, "floor and psi are told iff values are off, push iff agents are disturbed, sizes iff either"
-        )
-        V = functions[witness.function]
-        nodes = V.component.nodes
-        need(positions(doc, graph, entry.nodes, "nodes of forms") == nodes, "nodes are not those of the function")
-        phi, lag = {v: witness.phi[v] for v in nodes}, late * q
-        bits = length((b, kap, lag, entry.initial, entry.left, V.rate, *phi.values()))
-        spend(30 * len(nodes) * len(family.modes), bits, bits, "small delays")
-        need(b > 0 and b * late <= LARGEST_GROWTH and q >= exp(b * late)[1], "b is not positive, or q below e^(b h)")
-        speeds, unit = least(V.speeds)
-        heard = [
-            [(edge[0], edge[1], Fraction(edge[4], mode.unit)) for edge in mode.edges if edge[1] in phi]
-            for mode in family.modes
-        ]
-        sums = [heard_in_mode(edges, dict.fromkeys(nodes, Fraction(1))) for edges in heard]
-        pushes = [heard_in_mode(edges, phi) for edges in heard]
-        for v in nodes:
-            most = Fraction(speeds.get(v, 0), unit) + lag * max(push[v] for push in pushes)
-            need(phi[v] >= most, f"phi of agent {shorten(family.labels[v])} is too small")
-        need(kap >= 0 and all(kap**2 >= V.largest(push) for push in pushes), "kap is too small")
-        need(b + lag * kap <= V.rate / 2, "the delay takes more than the rate")
-        need(entry.initial >= V.root([x[v] for v in range(len(x))]), "initial is not proved")
-        need_left_at_deadline(messages, b, entry.left)
-        falling, standing = {v: phi[v] * entry.initial for v in nodes}, dict.fromkeys(nodes, Fraction(0))
-        away, floor, drive = [y / b for y in falling.values()], list(standing.values()), Fraction(0)
-        if wrong:
-            psi, f = {v: witness.psi[v] for v in nodes}, entry.floor or Fraction(0)
-            pushes = [
-                {v: late * x + wrong * D[v] for v, x in heard_in_mode(edges, psi).items()}
-                for edges, D in zip(heard, sums, strict=True)
-            ]
-            for v in nodes:
-                most = Fraction(speeds.get(v, 0), unit) * f + max(push[v] for push in pushes)
-                need(psi[v] >= most, f"psi of agent {shorten(family.labels[v])} is too small")
-            need(all((f * V.rate / 2) ** 2 >= V.largest(push) for push in pushes), "floor is too small")
-            standing = psi
-        if entry.push is not None:
-            need(entry.push**2 >= V.largest(dict.fromkeys(nodes, disturbance)), "push is too small")
-            drive = entry.push * formulas.drift_above(messages.gain, b, cap)
-            most = entry.push / (b * messages.least_gain())
-            standing = {v: y + phi[v] * most for v, y in standing.items()}
-        if entry.sizes is not None:
-            sizes, (own, unit) = [entry.sizes[v] for v in nodes], least(V.sizes)
-            for v, size in zip(nodes, sizes, strict=True):
-                need(size >= Fraction(own.get(v, 0), unit), f"size of agent {shorten(family.labels[v])} is too small")
-            away = [size * entry.initial for size in sizes]
-            floor = [size * ((entry.floor or 0) + drive) for size in sizes]
-        moved = falling.values(), standing.values()
-        decays.append(DecayOfAll(nodes, b, None, entry.left, away, floor, *map(list, moved)))
-        doc.done(f"b = {down(b)}")
-    rest = sorted(set(range(len(x))) - {end for mode in family.modes for edge in mode.edges for end in edge[:2]})
-    first, none = decays[0], [Fraction(0)] * len(rest)
-    return [*decays, DecayOfAll(rest, first.b, None, first.left, none, none, none, none)]
-
-
 def need_left_at_deadline(messages: Messages, b: Fraction, left: Fraction) -> Fraction:
     """Verify what is left of ``e^(-b s)`` at ``T``; return how far the clock comes at most, 0 without a cap."""
     if messages.gain_cap is None:
@@ -238,20 +120,6 @@ def need_left_at_deadline(messages: Messages, b: Fraction, left: Fraction) -> Fr
     limits = formulas.Limits(messages.gain_cap)
     need(left >= formulas.decay_above(b * limits.clock_below(messages.gain)), "left is not proved")
     return limits.clock_above(messages.gain)
-
-
-def heard_in_mode(edges: Iterable[Edge], phi: Mapping[int, Fraction]) -> dict[int, Fraction]:
-    """Return ``sum_l w+_kl phi_l`` of a mode, of sources, targets and largest sizes of edges.
-
-    Examples
-    --------
-    >>> heard_in_mode([(0, 1, Fraction(2))], {0: Fraction(3), 1: Fraction(1)})
-    {0: Fraction(0, 1), 1: Fraction(6, 1)}
-    """
-    total = dict.fromkeys(phi, Fraction(0))
-    for source, target, high in edges:
-        total[target] += high * phi[source]
-    return total
 
 
 def function_of(doc: Document, verified: Verified, k: Any) -> Constants:

@@ -10,19 +10,12 @@ from itertools import pairwise
 from lmi.exact.decimal_rounding import down
 from lmi.exact.work import spend
 from ptcc_certify.checker.delay_lmi import LateLMI, check_delay_lmi
-from ptcc_certify.checker.delayed_forms import (
-    FunctionOfSignals,
-    LateFamilyForm,
-    LateForm,
-    SettlingSection,
-    check_form,
-    check_forms_of_family,
-    check_settling,
-)
+from ptcc_certify.checker.delayed_forms import LateForm, SettlingSection, check_form, check_settling
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import Family
 from ptcc_certify.checker.follower_rows import Followers, Rows, followers_of
+from ptcc_certify.checker.forms_of_families import FunctionOfSignals, LateFamilyForm, check_forms_of_family
 from ptcc_certify.checker.graph import MANY_EDGES
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.input_formulas import drift_above

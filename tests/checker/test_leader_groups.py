@@ -492,6 +492,8 @@ def test_what_is_stated_of_a_family_too_small_is_refused(name: str):
     for label, x in data["proof"][of]["witness"]["phi"].items():
         less = changed(data, ("proof", of, "witness", "phi", label), str(number(x) * F(99, 100)))
         assert f"phi of agent {label} is too small" in reason(less)
+        turned = changed(data, ("proof", of, "witness", "phi", label), f"-{x}")
+        assert f"phi of agent {label} is negative" in reason(turned)
     for label, x in data["messages"]["residual"].items():
         if number(x):
             less = changed(data, (*TOP, "residual", label), str(number(x) * F(999, 1000)))

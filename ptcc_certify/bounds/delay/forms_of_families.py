@@ -30,7 +30,7 @@ from lmi.exact.decimal_rounding import float_up
 from lmi.exact.elementary_enclosures import exp, rounded
 from ptcc_certify.bounds.delay.case import LateCase, Moments
 from ptcc_certify.bounds.delay.decay_by_rows import driven
-from ptcc_certify.checker.delayed_forms import Edge, heard_in_mode
+from ptcc_certify.checker.forms_of_families import Edge, heard_in_mode
 from ptcc_certify.checker.input_formulas import BITS, drift_above, root_above
 from ptcc_certify.checker.signal_bounds import Function, least
 from ptcc_certify.checker.stated_bounds import DecayOfAll

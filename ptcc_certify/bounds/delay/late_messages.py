@@ -39,7 +39,8 @@ from ptcc_certify.bounds.virtual_positions import (
     vehicles_section,
 )
 from ptcc_certify.checker.delay_lmi import LateLMIWitness
-from ptcc_certify.checker.delayed_forms import LateFamilyForm, LateFormWitness, SettlingWitness
+from ptcc_certify.checker.delayed_forms import LateFormWitness, SettlingWitness
+from ptcc_certify.checker.forms_of_families import LateFamilyForm
 from ptcc_certify.checker.message_ages import Delays, Packets
 from ptcc_certify.checker.messages import MessagesSection, StepsStart
 from ptcc_certify.checker.missed_deadline import Signs
@@ -76,13 +77,8 @@ class LateBounds:
         than ``T`` to come from leaders to all.
     residual : (N,) array or None
         What bounds ``|x_k(T) - x_k*|`` row by row, in floats from above; None where nothing does.
-    form : SmallDelays or None
-        What a Lyapunov function of the whole graph proves under a capped gain.
-    lmi : DelayLMIBound or None
-        What the delay LMI proves of the whole graph under a capped gain.
-    forms : tuple of FamilyForm
-        What Lyapunov functions of a family prove, component by component, of how far agents are from where they would
-        settle under the signal.
+    of_all : tuple of Settling, SmallDelays, DelayLMIBound or FamilyForm
+        What Lyapunov functions of the graph or the family prove of all agents, at every instant up to ``T``.
     longest_delay : float or None
         About the longest delay that such functions forgive: this certificate's limit. None if it was not asked.
     input : (N,) array or None
@@ -90,8 +86,6 @@ class LateBounds:
     enough : Fraction or None
         The age up to which no more is left than was asked, near to the longest one that is proved; all times of
         ``messages`` in proportion.
-    settling : Settling or None
-        What holds of followers that hear late of leaders in groups.
     vehicles : VehicleBounds or None
         What follows of double integrators that track these agents, which then are virtual.
     """
@@ -103,13 +97,10 @@ class LateBounds:
     missed: Missed | None = None
     staged: tuple[Fraction, ...] | None = None
     residual: np.ndarray | None = None
-    form: SmallDelays | None = None
-    lmi: DelayLMIBound | None = None
-    forms: tuple[FamilyForm, ...] = ()
+    of_all: tuple[Settling | SmallDelays | DelayLMIBound | FamilyForm, ...] = ()
     longest_delay: float | None = None
     input: np.ndarray | None = None
     enough: Fraction | None = None
-    settling: Settling | None = None
     vehicles: VehicleBounds | None = None
 
     @property
@@ -179,9 +170,24 @@ class LateBounds:
         return [*self.rows, *(() if self.steps is None else (self.steps,))]
 
     @property
-    def of_all(self) -> list[Settling | SmallDelays | DelayLMIBound | FamilyForm]:
-        """What bounds deviations of all agents at every instant up to ``T``."""
-        return [one for one in (self.settling, self.form, self.lmi, *self.forms) if one is not None]
+    def settling(self) -> Settling | None:
+        """What holds of followers that hear late of leaders in groups."""
+        return next((one for one in self.of_all if isinstance(one, Settling)), None)
+
+    @property
+    def form(self) -> SmallDelays | None:
+        """What a Lyapunov function of the whole graph proves."""
+        return next((one for one in self.of_all if isinstance(one, SmallDelays)), None)
+
+    @property
+    def lmi(self) -> DelayLMIBound | None:
+        """What the delay LMI proves of the whole graph under a capped gain."""
+        return next((one for one in self.of_all if isinstance(one, DelayLMIBound)), None)
+
+    @property
+    def forms(self) -> tuple[FamilyForm, ...]:
+        """What Lyapunov functions of a family prove, component by component."""
+        return tuple(one for one in self.of_all if isinstance(one, FamilyForm))
 
     @property
     def says_something(self) -> bool:
@@ -512,10 +518,7 @@ def read_late(
         missed=missed,
         staged=staged,
         residual=floats_up(section.residual),
-        form=_of_whole_graph(SmallDelays, section.form, proved.get(("late-form", "messages.form"))),
-        lmi=_of_whole_graph(DelayLMIBound, section.lmi, proved.get(("late-lmi", "messages.lmi"))),
-        settling=_of_whole_graph(Settling, section.settling, proved.get(("late-settling", "messages.settling"))),
-        forms=tuple(_read_forms(case, section, proved)),
+        of_all=(*_of_whole_graph(section, proved), *_read_forms(case, section, proved)),
         input=floats_up(section.input),
         vehicles=vehicles,
     )
@@ -533,12 +536,13 @@ def _read_forms(case: LateCase, section: MessagesSection, proved: Any) -> Iterat
         yield FamilyForm(witness.function, nodes, q, b, kap, phi, *said)
 
 
-def _of_whole_graph(kind: Any, section: Any, step: Any) -> Any:
-    """Return what a Lyapunov function of the whole graph proves: fields of its section, its obligation and witness."""
-    if section is None:
-        return None
-    known = {**step, **vars(step["witness"]), **vars(section)}
-    return kind(**{field.name: _fixed(known[field.name]) for field in fields(kind)})
+def _of_whole_graph(section: MessagesSection, proved: Any) -> Iterator[Any]:
+    """Yield what Lyapunov functions of the whole graph prove: fields of sections, obligations and witnesses."""
+    for kind, name in ((Settling, "settling"), (SmallDelays, "form"), (DelayLMIBound, "lmi")):
+        if (own := getattr(section, name)) is not None:
+            step = proved[f"late-{name}", f"messages.{name}"]
+            known = {**step, **vars(step["witness"]), **vars(own)}
+            yield kind(**{field.name: _fixed(known[field.name]) for field in fields(kind)})
 
 
 def _fixed(value: Any) -> Any:

@@ -51,14 +51,10 @@ def longest_forgiven(case: LateCase) -> float | None:
 
 def with_forms(late: LateBounds) -> LateBounds:
     """Add what the best Lyapunov functions of the whole graph prove."""
-    kinds: dict[str, Any] = {"settling": SettlingBounds, "form": SmallDelayBounds, "lmi": DelayLMIBounds}
-    decays = []
-    for name, kind in kinds.items():
-        if kind.asked(late.case) and (found := kind(late.case).best()) is not None:
-            bound, decay = found
-            decays.append(decay)
-            late = replace(late, **{name: bound})
-    return _with_decays(late, decays)
+    kinds: tuple[Any, ...] = SettlingBounds, SmallDelayBounds, DelayLMIBounds
+    found = [pair for kind in kinds if kind.asked(late.case) and (pair := kind(late.case).best()) is not None]
+    bounds, decays = zip(*found, strict=True) if found else ((), ())
+    return _with_decays(replace(late, of_all=bounds), decays)
 
 
 def with_forms_of_family(late: LateBounds, parts: Sequence[tuple[FamilyComponent, Sequence[Function]]]) -> LateBounds:
@@ -71,7 +67,7 @@ def with_forms_of_family(late: LateBounds, parts: Sequence[tuple[FamilyComponent
     for decay in decays:
         at_T = (x * decay.left + y for x, y in zip(decay.away, decay.floor, strict=True))
         residual[list(decay.nodes)] = [float_up(x) for x in at_T]
-    return _with_decays(replace(late, forms=forms, residual=residual * MORE), decays)
+    return _with_decays(replace(late, of_all=forms, residual=residual * MORE), decays)
 
 
 def _with_decays(late: LateBounds, decays: Sequence[DecayOfAll]) -> LateBounds:
