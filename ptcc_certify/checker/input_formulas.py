@@ -282,7 +282,7 @@ class Limits:
         return rounded(max(self.integrals(gain)[0] - lost, Fraction(0)), BITS)
 
     def clock_above(self, gain: PrescribedGain) -> Fraction:
-        """Bound the integral of the gain up to the deadline from above, without sampling, but for the largest one.
+        """Bound the integral of ``gain`` up to the deadline from above, without sampling, but for the largest gain.
 
         Raises
         ------
