@@ -240,10 +240,13 @@ def _read_family(case: Case) -> Family:
         asked, mend, messages = "leaders that move", "leave it out", case.messages
         if messages is not None:
             asked, late = messages.asked, messages.age > 0 and messages.gain_cap is None
-            if messages.at_rest and not late and (messages.settles or messages.vehicles is None):
+            driven = messages.vehicles is not None and not messages.settles
+            if messages.at_rest and not late and not driven:
                 leading_group(family, asked)
                 return family
-            mend = "add a gain cap" if messages.at_rest and late else mend
+            if messages.at_rest:
+                mend = "add a gain cap" if late else "leave out the vehicles, or what is off"
+                asked += "" if late else " of vehicles that exchange virtual positions"
         refuse_other_targets(family, asked, mend)
     return family
 

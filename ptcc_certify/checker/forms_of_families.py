@@ -46,8 +46,8 @@ class FunctionOfSignals(Function, Protocol):
 class LateFamilyForm:
     """A function of a component of a family under small delays: its root at first, and the share that is left.
 
-    Where values are off or agents disturbed how far agents may be from where their leaders are, over the root, what
-    errors make of it, and what disturbances add to it per unit of time.
+    Where values are off or agents disturbed how far agents may be from their targets, over the root, what errors make of
+    it, and what disturbances add to it per unit of time.
     """
 
     nodes: Nodes
@@ -68,8 +68,8 @@ def check_forms_of_family(
 ) -> list[DecayOfAll]:
     """Verify ``sqrt(V) <= e^(-b s) initial`` for every signal, ``|e_k| <= phi_k sqrt(V)``, of components of a family.
 
-    Return decays to where every agent would settle under the signal, where values are off or agents disturbed to where
-    its leaders are; agents whom nobody hears, and who hear nobody, keep to themselves.
+    Return decays to where every agent would settle under the signal; where values are off or agents disturbed, to its
+    target, where the pivots are now. Agents whom nobody hears, and who hear nobody, keep to themselves.
     """
     doc.at = "messages.forms"
     state, leaders = begin.state, messages.leaders
@@ -181,7 +181,7 @@ class _FormUnderDelays:
         return found
 
     def _sizes(self, values: Numbers) -> list[Fraction]:
-        """Verify how far agents are from their leaders, over the root; return that of the nodes."""
+        """Verify how far agents are from their targets, over the root; return that of the nodes."""
         (known, unit), found = least(self.V.sizes), [values[v] for v in self.nodes]
         for v, size in zip(self.nodes, found, strict=True):
             least_size = Fraction(known.get(v, 0), unit)

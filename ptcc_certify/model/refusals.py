@@ -43,6 +43,10 @@ _NOT_LATE = {
     "sample_period": "of late messages a period tells how often they are sent; give that instead",
     "delta": "is given twice: MovingLeaders(disturbance=..) tells what disturbs the followers; leave one of them out",
 }
+_PUSHED = {
+    True: "leaders that move as they like:",
+    False: "disturbances beside such messages: give weights that are uncertain, if by 0.1 % alone; otherwise",
+}
 _CAPPED = "followers of leaders that move are certified under one gain cap alone; leave others out"
 #: What is not certified beside leaders that move.
 _NOT_TRACKING = {
@@ -182,8 +186,7 @@ def refuse_beside(structure: Structure, case: Case) -> None:
     if leaders is not None:
         if messages is None or messages.leaders is None:
             raise ParameterError("leaders", "that move are not certified of these agents; leave them out")
-        what = "leaders that move as they like" if leaders.speed else "disturbances where messages are late"
-        refuse_leader_groups(structure, f"{what}: a bound")
+        refuse_leader_groups(structure, f"{_PUSHED[bool(leaders.speed)]} a bound")
     if messages is not None:
         _refuse_messages(structure, messages, [limit.gain_cap for limit in case.limits])
     if structure.graph.n_edges == 0:
@@ -208,7 +211,8 @@ def _refuse_messages(structure: Structure, messages: LateMessages, caps: Sequenc
     if messages.value_error and messages.own_delay:
         raise ParameterError("values that are off are not certified where the own state is late; leave one of them out")
     if messages.value_error and messages.gain_cap is None:
-        refuse_leader_groups(structure, "what values that are off add: add a gain cap; otherwise a bound")
+        of_family = "add a gain cap, or give weights that are uncertain, if by 0.1 % alone"
+        refuse_leader_groups(structure, f"what values that are off add: {of_family}; otherwise a bound")
     if messages.gain_cap is None and not messages.leaders_hear_at_once(structure):
         at_once = f"delays of 0 within their group{', and no period' if messages.held else ''}"
         mend = f"add a gain cap, or let leaders hear each other at once ({at_once})"

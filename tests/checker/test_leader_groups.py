@@ -524,6 +524,14 @@ def test_forms_are_of_families_and_form_is_of_one_graph():
     assert "of a family" in reason({**family, "messages": {**family["messages"], "form": graph["messages"]["form"]}})
 
 
+def test_a_vector_that_is_not_positive_proves_no_delay():
+    """Long delays of two agents that mirror each other: ``phi >= c + h q B phi`` with entries below 0, which cancel."""
+    data = json.loads(Path(__file__).with_name("negative_phi.json").read_text("utf-8"))
+    for stdlib in (False, True):
+        report = check(data, stdlib=stdlib)
+        assert not report.accepted and report.reason == "phi of agent b is negative"
+
+
 # ---------------------------------------------------------------------- what is asked
 
 
@@ -549,7 +557,7 @@ def test_a_delay_that_is_not_forgiven_is_left_open():
     [
         ({"messages": LateMessages(delay="0.01")}, "add a gain cap"),
         ({"leaders": MovingLeaders(speed=1)}, "leave it out"),
-        (VIRTUAL | OFF, "leave it out"),
+        (VIRTUAL | OFF, "leave out the vehicles"),
     ],
 )
 def test_of_a_family_with_a_leader_group_the_rest_is_refused(parts: dict[str, Any], why: str):

@@ -266,10 +266,13 @@ def test_agents_that_begin_on_their_targets_are_not_said_to_get_little_nearer(wo
         (("team.csv", "--leader-speed", "1", "--initial-bound", "1"), "--initial-bound is not taken up"),
         (("team.csv", "--delay", "0.1", "--stop-before", "0.1"), "--stop-before: late messages are certified under a"),
         (("team.csv", "--delay", "0.1", "--sample-period", "0.1"), "--sample-period: of late messages a period tells"),
-        (("group.csv", "--delay", "0.1", "--noise", "1"), "what values that are off add: add a gain cap; otherwise"),
+        (
+            ("group.csv", "--delay", "0.1", "--noise", "1"),
+            "add: add a gain cap, or give weights that are uncertain",
+        ),
         (
             ("group.csv", "--delay", "0.1", "--delta", "1"),
-            "disturbances where messages are late: a bound needs leaders",
+            "disturbances beside such messages: give weights that are uncertain",
         ),
         (
             ("team.csv", "--leader-speed", "1", "--stop-before", "0.1"),
@@ -367,7 +370,9 @@ def test_followers_of_a_leader_group_are_certified_without_a_cap_where_the_leade
     held = ptcc(*words, "--period", "0.01").err
     assert "let leaders hear each other at once (delays of 0 within their group, and no period)" in held
     off = ptcc(*words, "--quantisation", "0.1").err
-    assert "what values that are off add: add a gain cap; otherwise a bound needs leaders that listen to nobody" in off
+    assert (
+        "what values that are off add: add a gain cap, or give weights that are uncertain, if by 0.1 % alone; " in off
+    )
     assert ptcc(*words, "--quantisation", "0.1", "--gain-cap", "30").code in (0, 4)
 
 

@@ -14,12 +14,13 @@ error + delta delay``, ``off_i = h B_i psi + wrong D_i`` and
 
     psi_k >= c_k f + max_i off_i,    f r/2 >= sqrt(V) of all |x_k| <= off_i,    push >= sqrt(V) of all |x_k| <= delta
 
-``f + push int_0^t e^(-b (s(t) - s(r))) dr`` is added to the root of ``V``, which bounds how far agents are from where
-their leaders are: ``|x_k - sum_j B_kj x_j| <= size_k sqrt(V)``, ``B`` the common kernel, ``j`` its pivots.
+``f + push int_0^t e^(-b (s(t) - s(r))) dr`` is added to the root of ``V``, which bounds how far agents are from
+their targets: ``|x_k - sum_j B_kj x_j| <= size_k sqrt(V)``, ``B`` the common kernel, ``j`` its pivots.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -39,6 +40,8 @@ from ptcc_certify.theorems.family_behaviour import FamilyComponent
 
 #: Agents of a component for whose functions delays are tried, and halvings of the interval of ``b``.
 LARGEST, _HALVINGS = 120, 25
+#: The share of the rate at which the longest delay is sought.
+_LEAST_SHARE = Fraction(1, 1000)
 #: Room for rounding, relatively; of what errors add.
 _MORE, _ROOM = 1e-9, 1e-6
 
@@ -141,6 +144,22 @@ def forms_of_family(
     return tuple(found)
 
 
+def longest_delay_of_family(case: LateCase, parts: Sequence[tuple[FamilyComponent, Sequence[Function]]]) -> float:
+    """Return about the longest delay that functions of a family forgive: this certificate's limit, not the loop's."""
+    longest = math.inf
+    for component, functions in parts:
+        own = [] if component.nodes.size > 1 else [math.inf]
+        for V in functions if 1 < component.nodes.size <= LARGEST else ():
+            low, high = 0.0, float(V.rate) / 2
+            for _ in range(_HALVINGS if V.rate > 0 else 0):
+                middle = (low + high) / 2
+                tried = _Tried.of(component, V, Fraction(middle))
+                low, high = (middle, high) if tried.prove(V.rate * _LEAST_SHARE) is not None else (low, middle)
+            own.append(low / float(case.messages.gain_cap or 1))
+        longest = min(longest, max(own, default=0.0))
+    return longest
+
+
 def rest_of(case: LateCase, forms: Sequence[FamilyForm]) -> DecayOfAll:
     """Return what is so of agents whom nobody hears, and who hear nobody: they rest."""
     nodes = sorted(set(range(len(case.of.labels))).difference(*(one.nodes for one in forms)))
@@ -156,13 +175,10 @@ def _cost(found: FamilyForm) -> tuple[float, float]:
 
 def _bound(case: LateCase, component: FamilyComponent, V: Function, number: int) -> Iterator[FamilyForm]:
     """Yield what one function proves; nothing if it does not forgive this delay."""
-    n, rate = component.nodes.size, V.rate / 2
-    late = (case.messages.gain_cap or Fraction(0)) * case.messages.age
-    if not rate > 0 or (late and n > LARGEST):
+    rate, late = V.rate / 2, (case.messages.gain_cap or Fraction(0)) * case.messages.age
+    if not rate > 0 or (late and component.nodes.size > LARGEST):
         return
-    speeds, unit = least(V.speeds)
-    first = [Fraction(speeds.get(v, 0), unit) * (1 + Fraction(_MORE)) for v in range(n)]
-    tried = _Tried(V, first, [_edges(mode) for mode in component.family.modes], late)
+    tried = _Tried.of(component, V, late)
     b = Fraction(tried.largest_b(float(rate))) if late else rate
     if b and (proved := tried.prove(b)) is not None:
         q, kap, phi = proved
@@ -210,6 +226,13 @@ class _Tried:
     first: Sequence[Fraction]
     modes: Sequence[Sequence[Edge]]
     late: Fraction
+
+    @classmethod
+    def of(cls, component: FamilyComponent, V: Function, late: Fraction) -> _Tried:
+        """Return a function of a component under so much lateness on the clock."""
+        speeds, unit = least(V.speeds)
+        first = [Fraction(speeds.get(v, 0), unit) * (1 + Fraction(_MORE)) for v in range(component.nodes.size)]
+        return cls(V, first, [_edges(mode) for mode in component.family.modes], late)
 
     def prove(self, b: Fraction) -> tuple[Fraction, Fraction, list[Fraction]] | None:
         """Return ``q``, ``kap`` and ``phi`` for a rate; None if they prove less of it."""

@@ -15,7 +15,7 @@ from ptcc_certify.bounds.delay.case import LateCase
 from ptcc_certify.bounds.delay.decay_by_rows import MORE
 from ptcc_certify.bounds.delay.delay_lmi import DelayLMIBounds
 from ptcc_certify.bounds.delay.followers_of_groups import SettlingBounds
-from ptcc_certify.bounds.delay.forms_of_families import forms_of_family, rest_of
+from ptcc_certify.bounds.delay.forms_of_families import forms_of_family, longest_delay_of_family, rest_of
 from ptcc_certify.bounds.delay.late_messages import LateBounds, bound_late
 from ptcc_certify.bounds.delay.small_delays import SmallDelayBounds
 from ptcc_certify.bounds.virtual_positions import vehicles_of_all
@@ -60,6 +60,8 @@ def with_forms(late: LateBounds) -> LateBounds:
 def with_forms_of_family(late: LateBounds, parts: Sequence[tuple[FamilyComponent, Sequence[Function]]]) -> LateBounds:
     """Add what Lyapunov functions of a family prove, where it has groups of leaders."""
     forms = forms_of_family(late.case, parts)
+    if late.messages.age:
+        late = replace(late, longest_delay=longest_delay_of_family(late.case, parts))
     if not forms:
         return late
     decays = [*(one.decay(late.case) for one in forms), rest_of(late.case, forms)]

@@ -60,6 +60,14 @@ def late_facts(certificate: Certificate) -> Facts:
         yield Fact(head="input", standing="unproved", note=_unbounded_text(late), loud=True)
     if by_agent := _residual_text(late):
         yield Fact(head="left", note=f"at T by agent: {by_agent}", detail=True)
+    yield from _targets(late)
+
+
+def _targets(late: LateBounds) -> Facts:
+    """Tell what a target is where leaders hear each other, and values are off or agents disturbed."""
+    if late.forms and not late.messages.settles:
+        note = "targets are where the first leader of every group is now, in another camp its opposite; or 0"
+        yield Fact(head="left", note=note, detail=True)
 
 
 def _unbounded_text(late: LateBounds) -> str:
@@ -110,8 +118,7 @@ def _tracking(late: LateBounds, leaders: MovingLeaders, at: Fraction | None) -> 
     protocol, after = late.case.protocol, late.after or 0.0
     if (cap := late.messages.gain_cap) is not None:
         yield Fact(head=head, note=f"gain <= {near(cap)}{': under a cap nothing settles' if late.largest else ''}")
-    where = f"within {up(late.largest, 2)} of" if late.largest else "exactly" if late.forms else "on"
-    where += f" {late.goal}"
+    where = f"within {up(late.largest, 2)} of {late.goal}" if late.largest else f"on {late.goal}"
     then = f"within {up(after, 2)} of it from then on" if after else "and ever after"
     text = f"every {late.whose} {where} at T = {near(protocol.T)}, {then}"
     yield Fact(head=head, note=text, brief=(f"{text};",))
@@ -131,6 +138,7 @@ def _tracking(late: LateBounds, leaders: MovingLeaders, at: Fraction | None) -> 
         yield Fact(head="input", standing="unproved", note=note, loud=True)
     if late.largest and (by_agent := _residual_text(late)):
         yield Fact(head="left", note=f"at T by agent: {by_agent}", detail=True)
+    yield from _targets(late)
 
 
 def _pushed(late: LateBounds, leaders: MovingLeaders) -> Fact:
