@@ -46,8 +46,8 @@ class FunctionOfSignals(Function, Protocol):
 class LateFamilyForm:
     """A function of a component of a family under small delays: its root at first, and the share that is left.
 
-    Where values are off or agents disturbed how far agents may be from their targets, over the root, what errors make of
-    it, and what disturbances add to it per unit of time.
+    Where values are off or agents disturbed how far agents may be from their targets, over the root, what errors make
+    of it, and what disturbances add to it per unit of time.
     """
 
     nodes: Nodes
