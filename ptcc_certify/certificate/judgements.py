@@ -262,7 +262,7 @@ def judge_messages(proof: GraphProof | FamilyProof) -> list[Answer]:
         limit = f"; this certificate's limit is a delay of {late.longest_delay:.3g}" if limited else ""
         wish = "" if most is None else _longest(late, f"within {near(most, 12)} at T is ")
         mend = "; give an initial state" if proof.initial_state is None else ""
-        told = Answer(OPEN, late.messages.name, f"nothing is proved of what is left at T{mend}{limit}{wish}")
+        told = Answer(OPEN, late.messages.asked, f"nothing is proved of what is left at T{mend}{limit}{wish}")
         return [told, *_nothing_left(None if wish else most)]
     return [] if most is None else [_judge_residual(proof, late, most)]
 

@@ -545,6 +545,14 @@ def test_who_rests_alone_beside_a_group_keeps_its_place():
     assert still.checked.accepted and still.late.residual[2] == 0 and still.late.largest_bound([0.5])[0] < 10
 
 
+@pytest.mark.parametrize("name", ["capped", "late", "vehicles", "disturbed", "off"])
+def test_without_an_initial_state_it_is_left_open(name: str):
+    graphs = [SignedDigraph.from_edges(edges, ["a", "b", "c", "d"]) for edges in (RING, OTHER)]
+    made = certify(graphs, PROTOCOL, **OF_FAMILY[name])
+    assert made.checked.accepted and not made.late.says_something
+    assert int(made.assessment.exit_code) == 4 and "initial state" in made.assessment.text
+
+
 def test_a_delay_that_is_not_forgiven_is_left_open():
     begin, parts = asked({"messages": LateMessages(delay="0.5", gain_cap=12)})
     graphs = [SignedDigraph.from_edges(edges, ["a", "b", "c", "d"]) for edges in (RING, OTHER)]

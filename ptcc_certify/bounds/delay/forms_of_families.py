@@ -127,11 +127,13 @@ def forms_of_family(
     Parameters
     ----------
     case : LateCase
-        Of a family, with an initial state; of late messages with a cap of the gain.
+        Of a family; of late messages with a cap of the gain. Without an initial state there are none.
     parts : sequence of (FamilyComponent, sequence of Function)
         Every component with its functions, in the order in which files number them.
     """
     found, number = [], 0
+    if case.initial_state is None:
+        return ()
     for component, functions in parts:
         own: list[FamilyForm] = []
         for V in functions:

@@ -145,6 +145,8 @@ class LateBounds:
     def missing(self) -> str:
         """What was not found, in words, where nothing is proved."""
         of_groups = isinstance(self.structure, Family) and self.case.led_by_groups
+        if of_groups and self.relative:
+            return "it asks for an initial state"
         return f"no {'Lyapunov function that bears it' if of_groups else 'vector for the followers'} was found"
 
     @property
