@@ -8,6 +8,7 @@ Let ``x' = -F``, ``F = K y - p``, ``y' = -A y + C p``: agents ``x`` that hear la
     1/T_k = sum_e w_e^2/tau_e,    Z = [K, -I]
 
 implies ``y'P y <= e^(-2 b s) y(0)'P y(0)``, and that the integral of ``e^(2 b s) |Y p|^2`` is at most ``y(0)'P y(0)``.
+Errors of what is heard are channels with ``h_e = 0`` whose ``rho_e`` is bounded by what values are off by.
 """
 
 from __future__ import annotations
@@ -50,6 +51,8 @@ class LateSystem:
         Rows ``m_e``.
     walks : (d, q) array
         ``Y``.
+    errors : int
+        How many of the channels, the last ones, are errors of what is heard.
     """
 
     A: np.ndarray
@@ -61,6 +64,7 @@ class LateSystem:
     lateness: np.ndarray
     heard: np.ndarray
     walks: np.ndarray
+    errors: int = 0
 
     @property
     def rate(self) -> float:
@@ -68,7 +72,9 @@ class LateSystem:
         return float(np.linalg.eigvals(self.A).real.min())
 
 
-def delay_lyapunov(system: LateSystem, b: float, start: np.ndarray, least: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def delay_lyapunov(
+    system: LateSystem, b: float, start: np.ndarray, least: np.ndarray, price: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
     """Find the ``P >= least`` of least ``start'P start``, and multipliers.
 
     The program is solved in units of time in which the largest entry of ``K`` is 1.
@@ -81,6 +87,8 @@ def delay_lyapunov(system: LateSystem, b: float, start: np.ndarray, least: np.nd
     start : (m,) array
     least : (m, m) array
         Symmetric, positive semidefinite.
+    price : float
+        What multipliers of errors cost beside ``start'P start``: their sum times this is minimised, too.
 
     Returns
     -------
@@ -122,6 +130,8 @@ def delay_lyapunov(system: LateSystem, b: float, start: np.ndarray, least: np.nd
         N = N - G.T @ cp.diag(tau) @ G - Y.T @ Y
         limits += _multipliers(system, unit, T, tau)
     cost = cp.sum(cp.multiply(np.outer(start, start) / size, P)) + _TRACE * cp.trace(P)
+    if system.errors:
+        cost += price * unit / size * cp.sum(tau[-system.errors :])
     problem = cp.Problem(cp.Minimize(cost), [*limits, (N + N.T) / 2 >> 0])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # "solution may be inaccurate": what is found is proved by the caller

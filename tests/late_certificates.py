@@ -75,13 +75,13 @@ def settling(seed: int, gain_cap: Any = None) -> Json:
 
 
 @cache
-def whole(seed: int, own_delay: bool, apart: bool = True) -> Json:
+def whole(seed: int, own_delay: bool, apart: bool = True, error: Any = 0) -> Json:
     """A certificate of a leader group with followers under a capped gain, by the delay LMI, as it is made."""
     rng = np.random.default_rng(seed)
     graph, _ = grouped_graph(rng, int(rng.integers(1, 3)))
     x0 = [Fraction(int(v), 10) for v in rng.integers(-50, 50, graph.n_nodes)]
     delays = {(s, t): Fraction(int(rng.integers(2 if apart else 6, 7)), 1000) for s, t, _ in graph.edges}
-    messages = LateMessages(delays, own_delay=own_delay, gain_cap=8)
+    messages = LateMessages(delays, own_delay=own_delay, gain_cap=8, value_error=error)
     return plain(graph, nominal(), x0, messages=messages)
 
 

@@ -559,7 +559,8 @@ class LateOracle(Oracle):
     def delay_lmi(self) -> None:
         """Motions, and the inequality with a column for every late edge, by eigenvalues."""
         said = self.said["lmi"]
-        self.require(self.cap is not None and self.error == 0 and self.target is not None, "lmi: what it needs")
+        self.require(self.cap is not None and self.target is not None, "lmi: what it needs")
+        self.require(not self.error or self.said["own"] == "fresh", "lmi: a late own state that is off")
         if self.false or self.cap is None:
             return
         step = self.witness("messages.lmi")
@@ -578,6 +579,15 @@ class LateOracle(Oracle):
                 late.append((w * np.eye(self.n)[t], m, h, float(number(x))))
             else:
                 self.require(h == 0 or (not own and not self.L[s][s]), "lmi: a late edge without a multiplier")
+        floor = 0.0
+        self.require(("floor" in said) == ("errors" in step["witness"]) == (self.error > 0), "lmi: floor and errors")
+        if self.error and not self.false:
+            taus = {v: x for v, x in enumerate(self.vector(step["witness"]["errors"])) if self.L[v][v]}
+            for v, x in taus.items():  # channels of no lateness, by which values are off
+                late.append((float(self.L[v][v]) * np.eye(self.n)[v], np.zeros(self.n), 0.0, float(x)))
+            floor = float(number(said["floor"]))
+            made = float(self.error) ** 2 * sum(map(float, taus.values()))
+            self.require(2 * float(b) * floor**2 >= made * (1 - 1e-9) and min(taus.values()) > 0, "lmi: floor")
         W, M = (np.array([e[k] for e in late]).reshape(len(late), self.n) for k in (0, 1))
         h, each = (np.array([e[k] for e in late]) for k in (2, 3))
         A, Z = C @ L[:, free], np.hstack([L[:, free], -W.T])
@@ -587,7 +597,7 @@ class LateOracle(Oracle):
         N = N - (M @ Z).T * c @ (M @ Z) - walk.T @ walk
         size = np.sqrt(np.abs(np.diag(N)) + 1e-300)
         self.require(np.linalg.eigvalsh(N / np.outer(size, size))[0] > -1e-7, "lmi: the inequality")
-        self.decays_along_motions("lmi", C.T @ P @ C, float(b))
+        self.decays_along_motions("lmi", C.T @ P @ C, float(b), floor)
 
     def behind_settling_leaders(self) -> None:
         said, step = self.said["settling"], self.witness("messages.settling")

@@ -11,6 +11,10 @@ if definite, says ``V' + 2 b V <= sum_e tau_e (rho_e^2 - c_e (m_e'F)^2) - |Q_fir
 ``T_k p_k^2 <= sum_e tau_e rho_e^2`` for ``1/T_k = sum_e w_e^2/tau_e``. Times ``e^(2 b s)`` the sum has an integral that
 is not positive, for ``F = 0`` before 0: ``V(s) <= e^(-2 b s) V(0)``, and that of ``e^(2 b s) |Q_first p|^2`` is at most
 ``V(0)``.
+
+Where values are off by ``nu``, ``p_k`` holds ``D_k rho_k`` besides, ``|rho_k| <= nu``, and ``1/T_k`` ``D_k^2/tau_k``.
+What that makes of agents that begin at rest is added: ``V <= f^2 = nu^2 sum_k tau_k/(2 b)``, and since the matrix is
+definite with 0 for ``b``, too, the integral of ``|Q_first p|^2`` up to ``s`` is at most ``2 b s f^2``.
 """
 
 from __future__ import annotations
@@ -27,17 +31,17 @@ from lmi.exact.definite import Arithmetic
 from lmi.exact.elementary_enclosures import exp, rounded
 from lmi.exact.numbers import integers, longest
 from lmi.exact.work import spend
-from ptcc_certify.checker.delayed_forms import LARGEST_GROWTH
+from ptcc_certify.checker.delayed_forms import LARGEST_GROWTH, need_left_at_deadline
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import combination
 from ptcc_certify.checker.final_state import deviation_rows
 from ptcc_certify.checker.graph import proved_above
 from ptcc_certify.checker.input import Verified
-from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above, root_above
+from ptcc_certify.checker.input_formulas import BITS, root_above
 from ptcc_certify.checker.matrix_products import Matrix, Sparse, need_rows, quadratic, times
 from ptcc_certify.checker.message_ages import PARTS, Messages
 from ptcc_certify.checker.reading import RejectedError, length, need
-from ptcc_certify.checker.section_declarations import FewAgents, Several, Triangle
+from ptcc_certify.checker.section_declarations import FewAgents, NotNegative, Several, Triangle
 from ptcc_certify.checker.stated_bounds import DecayOfAll
 
 Row = dict[int, Fraction]
@@ -78,6 +82,8 @@ class LateLoop:
         All nodes but the first one of each balanced closed component.
     channels : list of Channel
     own_late : bool
+    wrong : list of int
+        The agents that hear values that are off.
     """
 
     laplacian: Sequence[dict[int, int]]
@@ -86,6 +92,7 @@ class LateLoop:
     free: Sequence[int]
     channels: Sequence[Channel]
     own_late: bool
+    wrong: Sequence[int] = ()
 
     @cached_property
     def first(self) -> list[int]:
@@ -100,8 +107,8 @@ class LateLoop:
 
     @cached_property
     def listeners(self) -> list[int]:
-        """The agents that hear late."""
-        return sorted({e.listener for e in self.channels})
+        """The agents that hear late, or what is off."""
+        return sorted({e.listener for e in self.channels}.union(self.wrong))
 
     @cached_property
     def camps(self) -> list[Row]:
@@ -189,9 +196,13 @@ def channels_of(
 
 @dataclass(frozen=True, kw_only=True)
 class LateLMI:
-    """What one matrix proves: the share that is left, how far ends move, deviations at first, and what is left."""
+    """What one matrix proves: the share that is left, how far ends move, deviations at first, and what is left.
+
+    And what errors make of the root of the Lyapunov function.
+    """
 
     left: Fraction
+    floor: NotNegative | None = None
     moved: FewAgents
     away: FewAgents
     residual: FewAgents
@@ -199,10 +210,11 @@ class LateLMI:
 
 @dataclass(frozen=True, kw_only=True)
 class LateLMIWitness:
-    """``P``, and ``tau`` of every edge."""
+    """``P``, ``tau`` of every edge, and where values are off of every agent."""
 
     matrix: Triangle
     tau: Several[Fraction]
+    errors: FewAgents | None = None
 
 
 def check_delay_lmi(doc: Document, messages: Messages, verified: Verified, section: LateLMI) -> DecayOfAll:
@@ -211,27 +223,37 @@ def check_delay_lmi(doc: Document, messages: Messages, verified: Verified, secti
     graph, cap, state = verified.structure.graph, messages.gain_cap, verified.begin.state
     if cap is None or state is None:
         raise RejectedError("lmi without a cap of the gain, or without an initial state")
-    need(messages.value_error == 0, "lmi of values that are off")
+    error = messages.value_error
+    need(not (error and messages.late), "lmi of values that are off and of a late own state")
     need(verified.final.exact, "lmi without an exact influence of the leaders")
     obligation = doc.open("late-lmi", "messages.lmi")
     P, tau, b = obligation["witness"].matrix, obligation["witness"].tau, obligation["b"]
+    wrong, floor = obligation["witness"].errors, section.floor or Fraction(0)
+    told = wrong is not None, section.floor is not None
+    need(told == (error > 0, error > 0), "floor and errors are told iff values are off")
     loop, free = loop_of(messages, verified, cap), verified.structure.free_nodes
     need_rows(2 * graph.n)
     need(len(tau) == graph.n_edges and len(P) == len(free), "a matrix or tau of another size")
     late, left = {e.edge: e.lateness for e in loop.channels}, section.left
     need(b > 0 and 2 * b * max(late.values(), default=0) <= LARGEST_GROWTH, "b is not positive, or too large")
     need(all(x > 0 if k in late else x == 0 for k, x in enumerate(tau)), "tau is positive iff messages are late")
-    lmi = DelayLMI(loop, b, P, [tau[e.edge] for e in loop.channels])
+    off = {} if wrong is None else {v: wrong[v] for v in loop.wrong}
+    need(all(x > 0 for x in off.values()), "errors are positive of agents that listen")
+    lmi = DelayLMI(loop, b, P, [tau[e.edge] for e in loop.channels], off)
     need(lmi.proved(doc.exact), "the delay LMI is not proved")
-    need(left >= decay_above(b * Limits(cap).clock_below(messages.gain)), "left is not proved")
+    need(2 * b * floor**2 >= error**2 * sum(off.values(), Fraction(0)), "floor is too small")
+    clock = need_left_at_deadline(messages, b, left)
     root, (away, slope, walk) = lmi.root([state[v] for v in range(graph.n)]), lmi.constants(doc.exact)
-    moved = proved_above(graph, section.moved, "moved", [root * x for x in walk])
+    far = root + 2 * b * clock * floor
+    drawn = [far * x + floor * y for x, y in zip(walk, away, strict=True)]
+    moved = proved_above(graph, section.moved, "moved", drawn)
     first = proved_above(graph, section.away, "away", [root * x for x in away])
     rest = [x + y * left for x, y in zip(moved, first, strict=True)]
     proved_above(graph, section.residual, "residual", rest)
     doc.done(f"b = {down(b)}, gain at most {down(cap)}")
-    falling = [root * x for x in lmi.inputs(away, slope, walk)]
-    return DecayOfAll(range(graph.n), b, None, left, list(first), list(moved), falling, [Fraction(0)] * graph.n)
+    falling, standing = lmi.inputs(AgentConstants(away, slope, walk), (floor, error, clock))
+    columns = list(first), list(moved), [root * x for x in falling], standing
+    return DecayOfAll(range(graph.n), b, None, left, *columns)
 
 
 def loop_of(messages: Messages, verified: Verified, cap: Fraction) -> LateLoop:
@@ -243,7 +265,8 @@ def loop_of(messages: Messages, verified: Verified, cap: Fraction) -> LateLoop:
     lateness = [cap * messages.delay * Fraction(x, PARTS) for x in parts]
     lateness *= graph.n_edges if len(parts) == 1 else 1
     channels = channels_of(edges, lateness, [not row for row in rows], messages.late)
-    return LateLoop(rows, graph.unit, final.projection, structure.free_nodes, channels, messages.late)
+    wrong = [v for v, row in enumerate(rows) if row] if messages.value_error else []
+    return LateLoop(rows, graph.unit, final.projection, structure.free_nodes, channels, messages.late, wrong)
 
 
 class DelayLMI:
@@ -258,10 +281,19 @@ class DelayLMI:
         Symmetric.
     tau : sequence of Fraction
         Positive, one for each channel.
+    errors : mapping of int to Fraction
+        The same of agents that hear what is off.
     """
 
-    def __init__(self, loop: LateLoop, b: Fraction, P: Sequence[Sequence[Fraction]], tau: Sequence[Fraction]):
-        self.loop, self.b, self.tau = loop, b, tau
+    def __init__(
+        self,
+        loop: LateLoop,
+        b: Fraction,
+        P: Sequence[Sequence[Fraction]],
+        tau: Sequence[Fraction],
+        errors: Mapping[int, Fraction],
+    ):
+        self.loop, self.b, self.tau, self.errors = loop, b, tau, errors
         (self.P, self.scale), self.rational = integers(P), P
 
     def proved(self, exact: Arithmetic) -> bool:
@@ -303,7 +335,13 @@ class DelayLMI:
         sums = dict.fromkeys(self.loop.listeners, Fraction(0))
         for e, tau in zip(self.loop.channels, self.tau, strict=True):
             sums[e.listener] += rounded(Fraction(e.weight, self.loop.unit) ** 2 / tau, BITS, up=True)
+        for v, tau in self.errors.items():
+            sums[v] += rounded(self.weight_of(v) ** 2 / tau, BITS, up=True)
         return [rounded(1 / x, BITS) for x in sums.values()]
+
+    def weight_of(self, v: int) -> Fraction:
+        """Return ``D_v``."""
+        return Fraction(self.loop.laplacian[v][v], self.loop.unit)
 
     def root(self, x0: Sequence[Fraction]) -> Fraction:
         """Bound ``sqrt(V(0))`` from above."""
@@ -325,24 +363,38 @@ class DelayLMI:
         walk = [sum((r**2 for j, r in row.items() if j in loop.walks), Fraction(0)) for row in loop.camps]
         return AgentConstants(away, slope, [root_above(x * share) for x in walk])
 
-    def inputs(self, away: Sequence[Fraction], slope: Sequence[Fraction], walk: Sequence[Fraction]) -> list[Fraction]:
-        """Return ``phi_k`` with ``|F_k| <= phi_k sqrt(V(0)) e^(-b s)``.
+    def inputs(
+        self, constants: AgentConstants, errors: tuple[Fraction, Fraction, Fraction]
+    ) -> tuple[list[Fraction], list[Fraction]]:
+        """Return ``phi_k`` and ``psi_k``, ``|F_k| <= phi_k sqrt(V(0)) e^(-b s) + psi_k``, for ``f``, ``nu``, ``s(T)``.
 
         ``|F_k|`` is at most ``|(L x)_k|`` and what every late message adds: ``|w_e|`` times the sum over ``m_e`` of
-        ``|x_l(s) - x_l(s - h)|``, the deviations at both times and the walk between, or ``h`` times the largest slope.
+        ``|x_l(s) - x_l(s - h)|``, the deviations at both times and the walk between, or ``h`` times the largest slope;
+        and ``nu D_k``.
         """
-        loop, late = self.loop, []
+        (away, slope, walk), loop, (floor, error, clock) = constants, self.loop, errors
+        falling, standing = [], []
         for e in loop.channels:
             q = rounded(exp(self.b * e.lateness)[1], BITS, up=True)
             between = root_above(2 * self.b * e.lateness) * q  # over the walk of all times
             parts = ((1 + q) * away[v] + between * walk[v] for v in loop.heard(e))
-            late.append((e, rounded(e.lateness * q, BITS, up=True), sum(parts, Fraction(0))))
+            falling.append((e, rounded(e.lateness * q, BITS, up=True), sum(parts, Fraction(0))))
+            between = 2 * self.b * root_above(e.lateness * clock)
+            parts = (floor * (2 * away[v] + between * walk[v]) for v in loop.heard(e))
+            standing.append((e, e.lateness, sum(parts, Fraction(0))))
+        if not error:
+            return self._rounds(slope, falling), [Fraction(0)] * len(slope)
+        own = [floor * x + (error * self.weight_of(v) if v in self.errors else 0) for v, x in enumerate(slope)]
+        return self._rounds(slope, falling), self._rounds(own, standing)
+
+    def _rounds(self, own: Sequence[Fraction], late: Sequence[tuple[Channel, Fraction, Fraction]]) -> list[Fraction]:
+        """Return bounds of ``|F_k|``, put into themselves, of what agents add themselves and what is late."""
         phi: list[Fraction] | None = None
         for _ in range(ROUNDS):
-            total = list(slope)
+            total = list(own)
             for e, lag, far in late:
-                near = far if phi is None else min(far, lag * sum(phi[v] for v in loop.heard(e)))
-                total[e.listener] += abs(Fraction(e.weight, loop.unit)) * near
+                near = far if phi is None else min(far, lag * sum(phi[v] for v in self.loop.heard(e)))
+                total[e.listener] += abs(Fraction(e.weight, self.loop.unit)) * near
             phi = [rounded(x, BITS, up=True) for x in total]
         return phi or []
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from late_certificates import plain, whole, with_messages
-from mutations import Json, changed, resealed
+from mutations import Json, changed, resealed, without
 from oracle import number
 from oracle_messages import late_claims
 from schema_validator import VALIDATOR
@@ -20,6 +20,10 @@ from ptcc_certify.model.late_messages import LateMessages
 
 TOP = ("messages", "lmi")
 CASES = [(1, False), (2, True), (3, True)]
+
+
+#: The same with values that are off.
+OFF = [(1, "1/50"), (2, "1/10")]
 
 
 def place(data: Json) -> tuple[str, int]:
@@ -44,6 +48,44 @@ def test_what_is_made_is_accepted_by_both_arithmetics_and_kept_to_by_motions(see
     VALIDATOR.validate(data)
     assert check(data).accepted and check(data, stdlib=True).accepted
     assert late_claims(data) == []
+
+
+@pytest.mark.few(1)
+@pytest.mark.parametrize(("seed", "error"), OFF)
+def test_so_it_is_where_values_are_off(seed: int, error: str):
+    data = whole(seed, False, error=error)
+    VALIDATOR.validate(data)
+    assert check(data).accepted and check(data, stdlib=True).accepted
+    assert late_claims(data) == []
+
+
+@pytest.mark.parametrize(("seed", "error"), OFF)
+def test_what_errors_add_is_not_less_than_is_proved(seed: int, error: str):
+    data = whole(seed, False, error=error)
+    said, step = data["messages"]["lmi"], place(data)
+    errors = data[step[0]][step[1]]["witness"]["errors"]
+    for key in ("moved", "residual"):
+        for label, x in said[key].items():
+            if number(x) > 0:
+                less = scaled(x, Fraction(999, 1000))
+                assert f"{key} of agent {label} is not proved" in reason(data, (*TOP, key, label), less)
+    assert "floor is too small" in reason(data, (*TOP, "floor"), scaled(said["floor"], Fraction(999, 1000)))
+    assert "iff values are off" in reason(without(data, (*TOP, "floor")))
+    assert "iff values are off" in reason(without(data, (*step, "witness", "errors")))
+    for label, x in errors.items():
+        path = (*step, "witness", "errors", label)
+        if number(x):
+            assert "not proved" in reason(data, path, scaled(x, Fraction(1, 1000)))
+            assert "errors are positive" in reason(data, path, "0")
+            assert "errors are positive" in reason(data, path, f"-{x}")
+            assert "floor is too small" in reason(data, path, scaled(x, Fraction(3)))
+    louder = changed(data, ("messages", "value_error"), scaled(data["messages"]["value_error"], Fraction(2)))
+    assert "too small" in reason(louder)
+    assert "own state" in reason(data, ("messages", "own"), "late")
+    for label, x in data["messages"]["input"].items():
+        if number(x) > Fraction(1, 10**6):
+            found = reason(data, ("messages", "input", label), scaled(x, Fraction(99, 100)))
+            assert f"the input of agent {label} is not proved" in found
 
 
 @pytest.mark.parametrize(("seed", "own"), CASES)
@@ -117,7 +159,7 @@ def test_without_a_cap_or_a_state_or_with_values_that_are_off_it_is_refused():
     step, said = place(data), data["messages"]["lmi"]
     bare = plain(SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1), (3, 2, 1)]), NominalProtocol(1, 1, 3, 1), [3, 1, 2])
     said = {"left": said["left"]} | {k: dict.fromkeys("123", "1") for k in ("moved", "away", "residual")}
-    for options, what in (({}, "without a cap"), ({"gain_cap": 20, "value_error": "1/10"}, "values that are off")):
+    for options, what in (({}, "without a cap"), ({"gain_cap": 20, "value_error": "1/10"}, "iff values are off")):
         forged = with_messages(bare, "1/100", **options)
         forged["messages"] = {k: x for k, x in forged["messages"].items() if k != "input"} | {"lmi": said}
         proof = [one for one in forged["proof"] if one["kind"] != "late-input"]

@@ -161,6 +161,8 @@ def test_the_schema_is_a_strict_schema():
         },
         "LateForm": {"floor"},
         "LateFormWitness": {"psi"},
+        "LateLMI": {"floor"},
+        "LateLMIWitness": {"errors"},
         "LateFamilyForm": {"sizes", "floor", "push"},
         "Moving": {"sign_gain"},
         "RowsBound": {"cap", "clock", "drift", "after"},

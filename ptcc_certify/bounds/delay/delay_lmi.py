@@ -24,7 +24,7 @@ from lmi.exact.numbers import common_denominator
 from lmi.exact.work import WorkError
 from ptcc_certify.bounds.delay.case import LateCase, Moments, moments
 from ptcc_certify.checker.delay_lmi import DelayLMI, LateLoop, Row, channels_of
-from ptcc_certify.checker.input_formulas import BITS
+from ptcc_certify.checker.input_formulas import BITS, Limits, root_above
 from ptcc_certify.checker.stated_bounds import DecayOfAll
 
 #: Above so many free agents nothing is searched; above the other the first function that is found is taken, and the
@@ -59,8 +59,12 @@ class DelayLMIBound:
     left : Fraction
         ``e^(-b s(T))`` from above.
     moved, away, residual : tuple of N Fraction
-        How far from ``Q X(0)`` agents are drawn to, what beside that decays of their deviations, where they are at
-        first, and how far from ``Q X(0)`` they are at ``T``, from above.
+        How far from ``Q X(0)`` agents are drawn to up to ``T``, what beside that decays of their deviations, where they
+        are at first, and how far from ``Q X(0)`` they are at ``T``, from above.
+    floor : Fraction or None
+        What errors make of the root of the function; None where no value is off.
+    errors : tuple of N Fraction, or None
+        Multipliers of errors; 0 of agents that hear nobody.
     """
 
     b: Fraction
@@ -70,6 +74,8 @@ class DelayLMIBound:
     moved: tuple[Fraction, ...]
     away: tuple[Fraction, ...]
     residual: tuple[Fraction, ...]
+    floor: Fraction | None = None
+    errors: tuple[Fraction, ...] | None = None
 
     def over_time(self, case: LateCase, t: np.ndarray) -> Moments:
         """Return what bounds ``|x_k - (Q X(0))_k|`` at instants."""
@@ -89,8 +95,9 @@ class DelayLMIBounds:
     def asked(case: LateCase) -> bool:
         """Tell whether such bounds are asked of a case."""
         messages = case.messages
-        late = messages.age > 0 and not messages.value_error and messages.gain_cap is not None
-        return case.of_whole_graph and late
+        told = messages.age > 0 or messages.value_error > 0
+        known = told and messages.gain_cap is not None and not (messages.value_error and messages.own_delay)
+        return case.of_whole_graph and known
 
     def __init__(self, case: LateCase):
         cap, clock = case.messages.gain_cap, case.clock()
@@ -113,7 +120,8 @@ class DelayLMIBounds:
         laplacian = [{j: int(x * unit) for j, x in row.items()} for row in rows]
         projection = [{j: Fraction(x) for j, x in self.influence.row(v).items()} for v in nodes]
         free = [v for v in nodes if v not in first]
-        return LateLoop(laplacian, unit, projection, free, (), self.case.messages.own_delay)
+        wrong = [v for v, row in enumerate(laplacian) if row] if self.case.messages.value_error else []
+        return LateLoop(laplacian, unit, projection, free, (), self.case.messages.own_delay, wrong)
 
     @cached_property
     def _edges(self) -> list[tuple[int, int, int]]:
@@ -146,7 +154,9 @@ class DelayLMIBounds:
     def _search(self, loop: LateLoop) -> Iterator[tuple[float, float, np.ndarray, np.ndarray]]:
         """Yield functions, as far as floats tell: how much is left at ``T``, in some unit, and ``b, P, tau``."""
         system, exact = _system(loop), loop.coordinates(self.case.state)
-        start = np.array([float(x / (max(map(abs, exact)) or 1)) for x in exact])
+        largest = max(map(abs, exact)) or Fraction(1)
+        start = np.array([float(x / largest) for x in exact])
+        off, clock = float(self.case.messages.value_error / largest), float(self.clock)
         D, most = _dense(loop.deviations, len(loop.free)), _fastest(system)
         # of how far the final state walks the largest sum of squares, over the columns that do
         walk = max((float(sum(r**2 for j, r in row.items() if j in loop.walks)) for row in loop.camps), default=0.0)
@@ -155,10 +165,16 @@ class DelayLMIBounds:
             left = math.exp(-min(b * float(self.clock), 700.0))
             with suppress(LMIError, np.linalg.LinAlgError):
                 size = 2 * b * max(left, _LEAST_LEFT) ** 2 if walk else 1.0
-                P, tau = delay_lyapunov(system, b, start, size * D.T @ D)
-                away = max(float(np.einsum("ij,ji->i", D, np.linalg.solve(P, D.T)).max()), 0.0)
+                # by what the root at first, and what errors make of it, are multiplied in what is left
+                at_first = math.sqrt(walk / (2 * b)) + left / math.sqrt(size)
+                of_errors = math.sqrt(2 * b * walk) * clock + 1 / math.sqrt(size)
+                price = (off * of_errors / at_first) ** 2 / (2 * b)
+                P, tau = delay_lyapunov(system, b, start, size * D.T @ D, price)
+                away = math.sqrt(max(float(np.einsum("ij,ji->i", D, np.linalg.solve(P, D.T)).max()), 0.0))
                 root = math.sqrt(max(float(start @ P @ start), 0.0))
-                yield root * (math.sqrt(walk / (2 * b)) + math.sqrt(away) * left), b, P, tau
+                floor = off * math.sqrt(float(tau[tau.size - system.errors :].sum()) / (2 * b))
+                whole = math.sqrt(walk / (2 * b)) * (root + 2 * b * clock * floor) + away * (root * left + floor)
+                yield whole, b, P, tau
 
     def longest_delay(self) -> float:
         """Return about the longest delay that some function forgives: this certificate's limit, not the loop's.
@@ -172,7 +188,7 @@ class DelayLMIBounds:
 
     def _longest_factor(self) -> float:
         """Return by what all ages may be multiplied, about."""
-        system, D = _system(self.loop()), _dense(self._whole.deviations, len(self._whole.free))
+        system, D = _system(replace(self.loop(), wrong=())), _dense(self._whole.deviations, len(self._whole.free))
         if not system.rate > 0 or not len(system.lateness):
             return math.inf if system.rate > 0 else 0.0
 
@@ -203,21 +219,29 @@ class DelayLMIBounds:
     ) -> tuple[DelayLMIBound, DecayOfAll] | None:
         """Return what a rounded function states, if it is proved."""
         exact, matrix = arithmetic(), [[Fraction(x) for x in row] for row in P.tolist()]
-        each = [Fraction(x) for x in np.maximum(tau, _LEAST * tau.max(initial=1.0)).tolist()]
-        lmi = DelayLMI(loop, b, matrix, each)
+        whole = [Fraction(x) for x in np.maximum(tau, _LEAST * tau.max(initial=1.0)).tolist()]
+        each, off = whole[: len(loop.channels)], dict(zip(loop.wrong, whole[len(loop.channels) :], strict=True))
+        lmi = DelayLMI(loop, b, matrix, each, off)
         if not lmi.proved(exact):
             return None
-        root, left = lmi.root(self.case.state), self.case.left(b)
-        constants = lmi.constants(exact)
-        moved = [rounded(root * x * _MORE, BITS, up=True) for x in constants.walk]
+        root, left, error = lmi.root(self.case.state), self.case.left(b), self.case.messages.value_error
+        constants, clock = lmi.constants(exact), Limits(self.cap).clock_above(self.case.protocol.gain.exact)
+        floor = rounded(root_above(error**2 * sum(off.values(), Fraction(0)) / (2 * b)), BITS, up=True)
+        far = root + 2 * b * clock * floor
+        drawn = (far * x + floor * y for x, y in zip(constants.walk, constants.away, strict=True))
+        moved = [rounded(x * _MORE, BITS, up=True) for x in drawn]
         away = [rounded(root * x * _MORE, BITS, up=True) for x in constants.away]
         residual = [rounded(x + y * left, BITS, up=True) for x, y in zip(moved, away, strict=True)]
         by_edge = dict(zip((e.edge for e in loop.channels), each, strict=True))
         edges = tuple(by_edge.get(k, Fraction(0)) for k in range(self.graph.n_edges))
-        falling, nothing = [root * x for x in lmi.inputs(*constants)], [Fraction(0)] * self.graph.n_nodes
-        bounds = (tuple(x) for x in (moved, away, residual))
+        falling, standing = lmi.inputs(constants, (floor, error, clock))
+        bounds = tuple(moved), tuple(away), tuple(residual)
         found = DelayLMIBound(b, tuple(map(tuple, matrix)), edges, left, *bounds)
-        return found, DecayOfAll(range(self.graph.n_nodes), b, None, left, away, moved, falling, nothing)
+        if error:
+            multipliers = tuple(off.get(v, Fraction(0)) for v in range(self.graph.n_nodes))
+            found = replace(found, floor=floor, errors=multipliers)
+        nodes, pushed = range(self.graph.n_nodes), [root * x for x in falling]
+        return found, DecayOfAll(nodes, b, None, left, away, moved, pushed, standing)
 
 
 def _dense(rows: Sequence[Row], width: int) -> np.ndarray:
@@ -232,7 +256,9 @@ def _dense(rows: Sequence[Row], width: int) -> np.ndarray:
 def _system(loop: LateLoop) -> LateSystem:
     """Return a loop in floats."""
     m, n, q = len(loop.free), len(loop.laplacian), len(loop.listeners)
-    channels = loop.channels
+    channels, wrong = loop.channels, loop.wrong
+    sizes = [*(e.weight for e in channels), *(loop.laplacian[v][v] for v in wrong)]
+    heard = [{v: Fraction(x) for v, x in loop.heard(e).items()} for e in channels]
     place = {v: k for k, v in enumerate(loop.listeners)}
     Z = _dense([{j: Fraction(x, loop.unit) for j, x in row.items()} for row in loop.slopes], m + q)
     return LateSystem(
@@ -240,14 +266,15 @@ def _system(loop: LateLoop) -> LateSystem:
         _dense(loop.pushed, q),
         Z[:, :m],
         np.array(loop.listeners, dtype=int),
-        np.array([place[e.listener] for e in channels], dtype=int),
-        np.array([float(Fraction(e.weight, loop.unit)) for e in channels]),
-        np.array([float(e.lateness) for e in channels]),
-        _dense([{v: Fraction(x) for v, x in loop.heard(e).items()} for e in channels], n),
+        np.array([place[v] for v in (*(e.listener for e in channels), *wrong)], dtype=int),
+        np.array([float(Fraction(x, loop.unit)) for x in sizes]),
+        np.array([float(e.lateness) for e in channels] + [0.0] * len(wrong)),
+        _dense([*heard, *({} for _ in wrong)], n),
         _dense(list(loop.walks.values()), q),
+        len(wrong),
     )
 
 
 def _fastest(system: LateSystem) -> float:
     """Return the rate of which shares are tried: that where nothing is late, or two over the largest lateness."""
-    return float(np.min(_IN_DELAY / system.lateness, initial=system.rate))
+    return float(np.min(_IN_DELAY / system.lateness[system.lateness > 0], initial=system.rate))

@@ -456,7 +456,8 @@ def late_obligations(late: LateBounds | None) -> Iterator[Obligation]:
         yield Obligation("late-form", f"messages.forms[{i}]", numbers, phi)
     if (lmi := late.lmi) is not None:
         floating: Any = [list(map(float, row)) for row in (*lmi.matrix, lmi.tau)]  # dyadic numbers, and short texts
-        matrix = LateLMIWitness(matrix=floating[:-1], tau=floating[-1])
+        errors = None if lmi.errors is None else Numbers(lmi.errors)
+        matrix = LateLMIWitness(matrix=floating[:-1], tau=floating[-1], errors=errors)
         yield Obligation("late-lmi", "messages.lmi", {"b": lmi.b}, matrix)
 
 
