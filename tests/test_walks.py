@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 from ptcc_certify.cli import cli
 
 ROOT = Path(__file__).parents[1]
+INSIDE = f"{ROOT}{os.sep}"
 #: A bold title, or what follows it, with a command; then the modules.
 WALK = re.compile(r"`ptcc ([^`]+)`:\n\n((?:\d+\. `[^`]+`.*\n(?: {2,}.*\n)*)+)")
 #: The graph of each file that the commands name: camps with two leaders, and a leader alone.
@@ -40,7 +42,7 @@ def entered(command: str) -> list[str]:
 
     def note(frame: FrameType, event: str, _argument: object) -> None:
         code = frame.f_code
-        if event == "call" and code.co_flags & FUNCTION and code.co_filename.startswith(str(ROOT)):
+        if event == "call" and code.co_flags & FUNCTION and code.co_filename.startswith(INSIDE):
             order[code.co_filename] = None
 
     before = sys.getprofile()
