@@ -120,7 +120,7 @@ def delay_lyapunov(
     if system.lateness.max(initial=0.0) > LATEST / unit:
         raise NoCertificate("values are later than numbers allow")
     P, (m, q) = cp.Variable((len(start), len(start)), symmetric=True), system.C.shape
-    N, size = P @ (system.A / unit), float(start @ start) + 1e-300
+    N, size = P @ (system.A / unit), max(float(start @ start), price * unit * system.errors) + 1e-300
     N, limits = N + N.T - 2 * (b / unit + SLACK) * P, [P - least / unit >> 0]
     tau = cp.Variable(max(len(system.weights), 1), nonneg=True)
     if q:
