@@ -200,23 +200,24 @@ class Recorded(Evidence):
         Parameters
         ----------
         what : str, optional
+            ``"glance"``, the default: who listens to whom beside every run in its proved tube, the bounds in words.
             ``"decay"``, ``"input"``, ``"graph"``, ``"states"``: runs and bounds, inputs and their proved peaks, graphs,
             states; ``"late"`` and ``"tracking"``: what is proved with late messages, or while leaders move. Of one
-            graph also ``"spectrum"``, the eigenvalues; of agents of order n ``"motion"`` and ``"formation"``. None:
-            ``main_figure``.
+            graph also ``"spectrum"``, the eigenvalues; of agents of order n ``"motion"`` and ``"formation"``.
         **keywords : Any
             ``ax`` and others of the function ``ptcc_certify.plot_<what>``.
 
         Returns
         -------
         matplotlib.axes.Axes
+            Of ``"glance"`` and ``"motion"`` the figure.
 
         Raises
         ------
         ParameterError
             No figure is called so, or there is nothing to draw.
         """
-        return rendered("page_figures.plot", self, what or self.proof.main_figure, **keywords)
+        return rendered("page_figures.plot", self, what or "glance", **keywords)
 
     # ------------------------------------------------------------------ equality
 

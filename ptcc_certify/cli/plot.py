@@ -37,6 +37,8 @@ OF_AGENTS = ("motion", "formation")
 _SHARED = ("input",)
 
 
+#: The figure of a certificate that is drawn unless another one is asked for.
+GLANCE = "glance"
 #: Figures of a certificate with late messages, or with moving leaders.
 OF_A_CERTIFICATE = ("late", "tracking")
 
@@ -62,11 +64,11 @@ class _Figure(click.Choice):  # type: ignore[type-arg]  # no generic class befor
 )
 @click.option(
     "--what",
-    type=_Figure([*OF_A_RUN, "graph", "spectrum", *OF_AGENTS, *OF_A_CERTIFICATE]),
-    help="States, input, or error under its proved bounds over time (these three of families too); the graph, or the "
-    "modes of a family; eigenvalues of one graph. Agents of order n: motion, input, and in the plane formation. "
-    "Certificates with late messages: late; with moving leaders: tracking.  [default: of a certificate what it claims, "
-    "else graph]",
+    type=_Figure([GLANCE, *OF_A_RUN, "graph", "spectrum", *OF_AGENTS, *OF_A_CERTIFICATE]),
+    help="Of a certificate a glance: who listens to whom, runs in their proved tubes, the bounds in words. States, "
+    "input, or error under its proved bounds over time (these three of families too); the graph, or the modes of a "
+    "family; eigenvalues of one graph. Agents of order n: motion, input, and in the plane formation. Certificates with "
+    "late messages: late; with moving leaders: tracking.  [default: of a certificate glance, else graph]",
 )
 @click.option(
     "-o",
@@ -106,9 +108,9 @@ def plot(
     if output is not None and PurePath(output).suffix.lower() not in FIGURES:
         raise ParameterError(f"{output}: figures are written to {', '.join(FIGURES)}; choose one of these")
     refuse_output(output)
-    if what in OF_A_CERTIFICATE and not certified:
-        flag = "--delay" if what == "late" else "--leader-speed"
-        raise ParameterError(f"--what {what} is of a certificate; make one with ptcc certify GRAPH {flag} .. -o c.json")
+    if what in (GLANCE, *OF_A_CERTIFICATE) and not certified:
+        flag = {"late": "--delay ..", "tracking": "--leader-speed .."}.get(what or "", "--x0 ..")
+        raise ParameterError(f"--what {what} is of a certificate; make one with ptcc certify GRAPH {flag} -o c.json")
     of_agents.refuse_dimension(options, "plot")
     try:
         if certified:
@@ -152,13 +154,14 @@ def _of_certificate(path: str, what: str | None, options: shared.Options) -> tup
         if begins and (of_agents or certificate.initial_state is not None):
             mend = "certify agents of order n with it" if of_agents else f"the certificate {path} has its own"
             raise ParameterError(f"--x0, or --seed, is for what holds no initial state; {mend}")
-        what = what or certificate.proof.main_figure
+        what = what or GLANCE
         of_these = OF_AGENTS if agents is None or agents.dimension == 2 else ("motion",)
         own = tuple({certificate.proof.main_figure} & set(OF_A_CERTIFICATE))  # of late messages, or of moving leaders
         drawn, others = ((*of_these, *_SHARED), OF_A_RUN) if of_agents else ((*own, *OF_A_RUN), OF_AGENTS)
         if what in others and what not in drawn:
             raise ParameterError(f"--what {what} is not drawn of {path}; ask for --what {' or '.join(drawn)}")
-        if of_agents or what not in OF_A_RUN:
+        begun = certificate.initial_state is not None and what == GLANCE  # which simulates what it draws
+        if of_agents or begun or what not in (GLANCE, *OF_A_RUN):
             return what, certificate
         if begins:
             one = (
@@ -172,6 +175,8 @@ def _of_certificate(path: str, what: str | None, options: shared.Options) -> tup
             question = replace(certificate.question, initial_state=tuple(x0))
             proof = replace(certificate.proof, question=question)  # to be drawn: what is proved holds for all
             certificate = replace(certificate, proof=proof)
+        elif what == GLANCE:
+            return what, certificate
         elif certificate.initial_state is None:
             raise ParameterError(f"{path}: the certificate holds no initial state; give one with --x0")
         begin("simulation")

@@ -24,9 +24,8 @@ from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.report.facts.graph import family_text
 from ptcc_certify.report.facts.of_certificate import facts_of
 from ptcc_certify.report.facts.of_structure import decision_facts, design_facts, structure_facts
-from ptcc_certify.report.page_figures import draw
+from ptcc_certify.report.plots.glance import plot_glance
 from ptcc_certify.report.plots.graph import plot_graph
-from ptcc_certify.report.plots.motion import plot_motion
 from ptcc_certify.report.plots.style import figure_bytes
 from ptcc_certify.report.plots.trade_off import plot_trade_off
 from ptcc_certify.report.plots.trajectory import plot_run
@@ -57,31 +56,17 @@ def structure_html(structure: Structure) -> str:
 
 @html_of.register(Certificate)
 def certificate_html(certificate: Certificate) -> str:
-    """Show a certificate: the screen of ``ptcc certify``, and the simulated decay under its proved bound.
+    """Show a certificate: the short screen of ``ptcc certify``, and up to 120 nodes the certificate at a glance.
 
-    Of one that was read, up to 120 nodes, the run is made for the figure; of a family that is a drawing of it.
+    Of a family that is a drawing of it, and all facts, since its runs under many signals take long.
     """
     if certificate.of_family:
         return _page(facts_of(certificate), *_family_figure(certificate.family_proof.family))
-    part, facts = certificate.proof.agents, facts_of(certificate, "signed digraph", {})
-    if part is not None:
-        drawn = part.initial_state is not None and certificate.graph_proof.graph.n_nodes <= SHOWN_NODES
-        alt = "positions, velocities and so on over time"
-        return _page(facts, plot_motion(certificate) if drawn else None, alt)
-    if figures := draw(certificate, ["late", "tracking"]):
-        (figure,) = figures.values()
-        return _page(facts, figure, "distance of the farthest agent under its proved bound, over time")
-    alt = "simulated decay of the error under its proved bound, over the time left to the deadline"
-    return _page(facts, draw(_with_run(certificate), ["decay"]).get("decay"), alt)
-
-
-def _with_run(certificate: Certificate) -> Certificate:
-    """Return a small certificate that was read with a run, which its file does not hold."""
-    made = certificate.source is None or certificate.trajectory is not None
-    if not (made or certificate.initial_state is None or certificate.graph_proof.graph.n_nodes > SHOWN_NODES):
-        with suppress(PTCCError):
-            return certificate.with_simulation(samples=201)
-    return certificate
+    facts = [fact for fact in facts_of(certificate, "signed digraph", {}, details=False) if not fact.detail]
+    small, figure = certificate.graph_proof.graph.n_nodes <= SHOWN_NODES, None
+    with suppress(PTCCError):
+        figure = plot_glance(certificate, words=False) if small else None
+    return _page(facts, figure, "who listens to whom, and the run of every agent where it is proved to be")
 
 
 @html_of.register(Family)

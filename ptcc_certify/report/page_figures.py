@@ -20,6 +20,7 @@ from ptcc_certify.report.html_text import set_text
 from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.decay import NothingDecays, plot_decay
 from ptcc_certify.report.plots.distributions import plot_degrees, plot_final_states
+from ptcc_certify.report.plots.glance import plot_glance
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.input import plot_input
 from ptcc_certify.report.plots.motion import plot_formation, plot_motion
@@ -36,6 +37,7 @@ from ptcc_certify.theorems.family_behaviour import DEPENDS, Counterexample, Fami
 
 #: What draws each figure of a certificate, on given axes or its own; all but the graph show its simulated run.
 PLOTS: dict[str, Callable[..., Any]] = {
+    "glance": plot_glance,
     "decay": plot_decay,
     "input": plot_input,
     "graph": plot_graph,
@@ -117,6 +119,8 @@ def draw(
         there["sliding"] = slid and not saved.direct and n <= TRACED_NODES
         there["input"] = n <= TRACED_NODES and (slid or not saved.proof.constant)
     figures = _figures(saved, [name for name in wanted if there.get(name)])
+    if "glance" in wanted and n <= DRAWN_NODES:
+        figures["glance"] = plot_glance(saved, words=False, runs=[agents_run] if agents_run else None)
     if agents_run is not None and saved.proof.agents is not None:
         figures["motion"] = plot_motion(agents_run)
         if saved.proof.agents.dimension == 2:
@@ -155,6 +159,8 @@ def _draw_family(
     if proof.late is not None and proof.late.says_something:
         there["tracking" if proof.late.tracks else "late"] = True
     figures = _figures(saved, [name for name in wanted if there.get(name)], runs)
+    if "glance" in wanted and proof.family.n_nodes <= DRAWN_NODES:
+        figures["glance"] = plot_glance(saved, words=False, runs=runs)
     for number, (_, _, component, one) in enumerate(why):
         try:
             figures[f"why{number}"] = plot_counterexample(component, why=one, protocol=saved.protocol).figure

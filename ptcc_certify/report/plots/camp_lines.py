@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
@@ -157,8 +158,11 @@ def name_agents(
     *,
     ends: bool = False,
     until: float | None = None,
+    told: bool = False,
 ) -> None:
     """Write the names of agents where their lines begin, and where they end if they end apart; show time ``until``.
+
+    If they are ``told``, the values at the ends stand beside the names there.
 
     ``lines`` holds the colours of the lines by agent, as :func:`draw_agents` returns them.
     """
@@ -166,8 +170,12 @@ def name_agents(
         return
     agents, colours = np.array(list(lines)), list(lines.values())
     names = [shorten_text(printable(run.labels[v]), NAME_LENGTH - 4) for v in agents]
-    texts = [_spread(ax, values[agents, k], names, colours) for k in ((0, -1) if ends else (0,))]
-    if ends and len(texts[1]) < 2:
+    texts = [_spread(ax, values[agents, 0], names, colours)]
+    if ends:
+        digits = 2 - math.floor(math.log10(float(np.abs(values).max()) or 1.0))  # a run's 1e-9 is 0
+        tails = [f": {round(float(x), digits) + 0.0:.3g}" if told else "" for x in values[agents, -1]]
+        texts.append(_spread(ax, values[agents, -1], names, colours, tails))
+    if ends and not told and len(texts[1]) < 2:
         del texts[1]  # all end at the same place
     first, last = float(run.t[0]), float(run.t[-1]) if until is None else until
     for side, column in zip((-1, 1), texts, strict=False):
@@ -194,12 +202,14 @@ def name_agents(
 
 
 def _spread(
-    ax: Axes, heights: np.ndarray, names: Sequence[str], colours: Sequence[str]
+    ax: Axes, heights: np.ndarray, names: Sequence[str], colours: Sequence[str], tails: Sequence[str] = ()
 ) -> list[tuple[float, float, str, str]]:
-    """Return heights of lines, heights of their names, which do not overlap, names, and colours.
+    """Return heights of lines, heights of their names, which do not overlap, names with their tails, and colours.
 
-    Lines that cannot be told apart there share one name.
+    Lines that cannot be told apart there share one name, and one tail.
     """
+    tails = tails or [""] * len(names)
+    alike = list(zip(colours, tails, strict=True))
     scale, limits = ax.yaxis.get_transform(), ax.get_ylim()
     low, high = scale.transform(np.array(limits))
     height = 0.75 * ax.get_window_extent().height / ax.figure.dpi * 72  # in points, when labels have their room
@@ -209,7 +219,7 @@ def _spread(
     for k in np.argsort(at, kind="stable"):
         if groups and at[k] - at[groups[-1][0]] < gap / 6:
             at[k] = at[groups[-1][0]]
-        if groups and at[k] == at[groups[-1][0]] and colours[k] == colours[groups[-1][0]]:
+        if groups and at[k] == at[groups[-1][0]] and alike[k] == alike[groups[-1][0]]:
             groups[-1].append(int(k))
         else:
             groups.append([int(k)])
@@ -217,7 +227,7 @@ def _spread(
     steps = gap * np.arange(len(groups))
     place = np.clip(isotonic_regression(place - steps).x, low + gap / 2, max(low + gap / 2, high - steps[-1])) + steps
     lines, texts = scale.inverted().transform([at[own[0]] for own in groups]), scale.inverted().transform(place)
-    joint = [_joined([names[k] for k in sorted(own)]) for own in groups]
+    joint = [_joined([names[k] for k in sorted(own)]) + tails[own[0]] for own in groups]
     return list(zip(lines, texts, joint, [colours[own[0]] for own in groups], strict=True))
 
 

@@ -37,6 +37,8 @@ _SHAPE, _TITLE, _LEGEND = 0.72, 0.2, 0.72
 _WIDTHS, _EQUAL = (0.6, 1.0), 0.9
 #: Columns of a panel's name.
 _NAME = 24
+#: Marks of nodes that have colours of their own, and their sizes as shares of a circle's; others are circles.
+_SHAPES = {"second camp": ("s", 0.9), "unbalanced leaders": ("D", 0.8)}
 #: Bends of an arrow that is alone between its ends, and of those that are not.
 _ALONE, _APART = 0.12, 0.25
 
@@ -63,7 +65,7 @@ class WeightRange(NamedTuple):
 
 
 @styled
-def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
+def plot_graph(subject: Any, *, ax: Axes | None = None, colours: Sequence[Any] | None = None) -> Axes:
     """Draw the signed digraph ``(V, E, W)``: an arrow from ``j`` to ``k`` where ``w_kj != 0``, so that ``k`` listens.
 
     Solid arrows come from allies (``w_kj > 0``), dashed ones from opponents; two opposite ones of the same weight are
@@ -86,6 +88,9 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
         of a packaged graph.
     ax : Axes, optional
         Several modes are drawn on parts of it.
+    colours : sequence of N colours, optional
+        Of the nodes, in place of those of their camps: the second camp is then drawn as squares, unbalanced leaders as
+        diamonds, and the legend tells these alone.
 
     Returns
     -------
@@ -101,7 +106,7 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     (['a', 'b', 'c'], 5)
     """
     if is_of_family(subject) or is_family(subject):
-        return _draw_family(as_family(getattr(subject, "family", subject)), ax)
+        return _draw_family(as_family(getattr(subject, "family", subject)), ax, colours)
     structure = structure_of(subject)
     graph = structure.graph
     own_axes = ax is None
@@ -117,16 +122,16 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     groups = [c.nodes for c in structure.closed_components if len(c.nodes) > 1 and structure.followers.size]
     for nodes in groups:
         draw_ground(ax, graph, layout.place, nodes, layout.radius)
-    if groups:
+    if groups and colours is None:
         ax.fill([], [], color=GROUND, label="leader group")
-    boxes = _draw_mode(ax, structure, camp_groups(structure), edges, bends, layout)
+    boxes = _draw_mode(ax, structure, camp_groups(structure), edges, bends, layout, colours=colours)
     finished(ax, "", "")
     if own_axes:
         fit_height(ax, boxes, layout.radius)
     return ax
 
 
-def _draw_family(family: Family, ax: Axes | None) -> Axes:
+def _draw_family(family: Family, ax: Axes | None, colours: Sequence[Any] | None) -> Axes:
     """Draw the modes of a family side by side; as matrices where they are large."""
     modes = family.modes[:PANELS]
     side = 2 if len(modes) > 1 and family.n_nodes <= BESIDE_NODES else 1
@@ -157,7 +162,8 @@ def _draw_family(family: Family, ax: Axes | None) -> Axes:
                 legend.remove()
         else:
             every_size = [edge for of_mode in edges for edge in of_mode]
-            _draw_mode(panel, analyse(mode.mandatory), groups, mode_edges, _bends(mode_edges), layout, every_size)
+            structure, bends = analyse(mode.mandatory), _bends(mode_edges)
+            _draw_mode(panel, structure, groups, mode_edges, bends, layout, every_size, colours)
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
             seen.setdefault(label, handle)
         if len(modes) > 1:
@@ -199,10 +205,14 @@ def _draw_mode(
     bends: np.ndarray,
     layout: _Layout,
     among: Sequence[WeightRange] = (),
+    colours: Sequence[Any] | None = None,
 ) -> np.ndarray:
     """Draw nodes, arrows, labels and sizes of one mode ``among`` others; return the boxes of what is drawn."""
     place, radius = layout.place, layout.radius
-    _draw_nodes(ax, place, radius, groups, structure.leaders, outlined=bool(among))
+    if colours is None:
+        _draw_nodes(ax, place, radius, groups, structure.leaders, outlined=bool(among))
+    else:
+        _draw_coloured(ax, place, radius, groups, structure.leaders, colours)
     among = among or edges
     differ, largest = len({edge.text for edge in among}) > 1, max((edge.arrow.size for edge in among), default=1.0)
     _draw_arrows(ax, edges, place, bends, radius, largest if differ else None)
@@ -265,6 +275,23 @@ def _draw_nodes(
                 ax.plot([], [], "o", markersize=6, label=label, **({"color": colour} if outlined else edge))
     if outlined:
         ax.plot([], [], "o", color="white", markersize=6, markeredgecolor="black", markeredgewidth=1.2, label="leads")
+
+
+def _draw_coloured(
+    ax: Axes, place: np.ndarray, radius: float, groups: np.ndarray, leaders: np.ndarray, colours: Sequence[Any]
+) -> None:
+    """Draw the nodes in colours that are given, in the shapes of their camps, those of leaders outlined."""
+    leads = set(leaders.tolist())
+    outline: dict[str, Any] = {"markeredgecolor": "black", "markeredgewidth": 1.4}
+    for k, (p, colour) in enumerate(zip(place, colours, strict=True)):
+        marker, size = _SHAPES.get(groups[k], ("o", 1.0))
+        edge = outline if k in leads else {"markeredgewidth": 0}
+        ax.plot(*p, marker, markersize=2 * radius * size, color=colour, zorder=3, **edge)
+    if 0 < len(leads) < len(groups):
+        ax.plot([], [], "o", color="white", markersize=6, label="leads", **outline)
+    for name, (marker, _) in _SHAPES.items():
+        if (groups == name).any():
+            ax.plot([], [], marker, color="0.5", markersize=6, label=name)
 
 
 def _draw_arrows(

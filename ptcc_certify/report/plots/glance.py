@@ -1,0 +1,250 @@
+"""A certificate at a glance: who listens to whom beside every agent's run in its proved tube, the bounds in words."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+from matplotlib import style
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap, Normalize, to_hex
+from matplotlib.figure import Figure, SubFigure
+
+from lmi.exact.decimal_rounding import near
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.errors import ParameterError, SimulationError, spell
+from ptcc_certify.graphs.size_limits import DRAWN_NODES, LABELLED_NODES, REPEATED_NODES
+from ptcc_certify.report.facts.of_certificate import facts_of
+from ptcc_certify.report.plots.camp_lines import draw_agents, name_agents
+from ptcc_certify.report.plots.decay import NothingDecays
+from ptcc_certify.report.plots.distributions import plot_final_states
+from ptcc_certify.report.plots.graph import plot_graph
+from ptcc_certify.report.plots.graph_labels import INSIDE
+from ptcc_certify.report.plots.motion import agents_run, plot_formation
+from ptcc_certify.report.plots.style import STYLE, finished, legend_columns, new_axes, shown, time_label
+from ptcc_certify.report.plots.subject import read_back, trajectory_of
+from ptcc_certify.report.plots.tracking import plot_tracking
+from ptcc_certify.report.plots.trajectory import plot_trajectory
+from ptcc_certify.report.text_layout import columns
+from ptcc_certify.simulation.trajectory import Trajectory
+from ptcc_certify.theorems.family_behaviour import DEPENDS
+
+#: Width and height in inches; how much wider the runs are drawn than the graph.
+SIZE, _RATIO = (7.16, 3.7), 1.35
+#: Colours of final states, from the least over 0 to the largest: all are legible on white, and white on them.
+ENDS = LinearSegmentedColormap.from_list("ends", ["#A84300", "#6A6A6A", "#005A9C"])
+#: What is told above the panels: the claim as the title, and of each row of heads the first fact that there is.
+_TOLD = (("late", "tracking", "error"), ("input",))
+#: Colours of a verdict: whether everything asked was proved.
+_GOOD, _DOUBT = "#117733", "#8A5A00"
+#: Characters of an inch of text; of the title, which is larger.
+_CHARACTERS, _OF_TITLE = 16.5, 12.5
+#: How dark tubes of all agents are together.
+_SHADE = 0.7
+#: Agents of which every one has a line; runs of more are drawn as ranges. Ends that are named.
+_LINES, _NAMED = LABELLED_NODES, 12
+
+
+def plot_glance(subject: Any, *, runs: Sequence[Any] | None = None, words: bool = True, time_unit: str = "") -> Figure:
+    """Draw a certificate at a glance.
+
+    Above: the claim, the verdict, and in words how near agents are to where they end, and with what input. Left: who
+    listens to whom, every agent in the colour of its final state - blue above 0, red below, grey at 0 - leaders
+    outlined, the second camp as squares. Right: the run of every agent in the same colour, shaded where it is proved to
+    be, with its final state at the end of its line.
+
+    Above 40 agents the graph is drawn as its matrix, and runs as ranges. Of families the runs are under many signals,
+    of vehicles in the plane their ways are drawn, and where nothing is known of an initial state the graph alone.
+
+    Parameters
+    ----------
+    subject : Certificate, or its path
+    runs : sequence of runs, optional
+        Of a family, or one of agents of order n; by default they are simulated.
+    words : bool
+        Whether claim, verdict and bounds stand above.
+    time_unit : str
+        Of the deadline, for the label of the axis.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    ParameterError
+        The subject is no certificate.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.glance import plot_glance
+    >>> foes = SignedDigraph.from_edges([("ann", "bob", -1), ("bob", "ann", -1)])
+    >>> figure = plot_glance(certify(foes, NominalProtocol(T=1, rho1=1, rho2=2, kappa=1), [3, 5]))
+    >>> [text.get_text() for text in figure.axes[1].texts]
+    ['ann', 'bob', 'ann: -1', 'bob: 1', '$T$ = 1']
+    """
+    certificate = read_back(subject)
+    if not isinstance(certificate, Certificate):
+        what = type(certificate).__name__
+        raise ParameterError(f"a glance is of a certificate, not of {what}; give certify(graph, protocol, x0)")
+    with style.context(STYLE):
+        figure = Figure(SIZE if words else (SIZE[0], SIZE[1] - 0.7), layout="constrained")
+        panels: Any = figure
+        if words:
+            panels = figure.subfigures(2, 1, height_ratios=(_write(figure, certificate), 1))[1]
+        left, right = panels.subfigures(1, 2, width_ratios=(1, _RATIO))
+        ends = _ends(certificate)
+        _draw_graph(left, certificate, ends)
+        _draw_runs(right, certificate, ends, runs, time_unit)
+        return shown(figure)
+
+
+def _ends(certificate: Certificate) -> np.ndarray:
+    """Return the final state of every agent, (N,): of an interval its middle, NaN where none is proved."""
+    part = certificate.proof.agents
+    if part is not None:  # of agents of order n that of positions; in several dimensions there is no one number
+        known = [agent[0][0][0] for agent in part.final_state or ()] if part.dimension == 1 else []
+    elif certificate.of_family:
+        known = [end if end is None else sum(end) / 2 for end in certificate.final_state or ()]
+    else:
+        known = [] if certificate.final_state is None else list(np.asarray(certificate.final_state))
+    ends = [np.nan if end is None else float(end) for end in known]
+    return np.array(ends or [np.nan] * len(certificate.labels))
+
+
+def _colours(ends: np.ndarray) -> list[str]:
+    """Return the colours of final states; grey of those that are not known."""
+    largest = float(np.nanmax(np.abs(ends), initial=0)) or 1.0
+    return [to_hex(colour) for colour in ENDS(Normalize(-largest, largest)(np.nan_to_num(ends)))]
+
+
+def _write(figure: Figure, certificate: Certificate) -> float:
+    """Write the claim, the verdict and the bounds above the panels; return the share of the height that they take."""
+    facts = [fact for fact in facts_of(certificate, details=False) if not fact.detail]
+    claims = [spell(fact.note) for fact in facts if fact.head == "claim"]
+    told = [
+        next(([f for f in facts if f.head == head] for head in heads if any(f.head == head for f in facts)), [])
+        for heads in _TOLD
+    ]
+    told = [sorted(group, key=lambda fact: fact.side == "down")[:2] for group in told]  # what is proved above, first
+    notes = [f"{fact.head}: {_set(spell(fact.note))}" for group in told for fact in group]
+    verdict = certificate.assessment
+    width, high = SIZE
+    room = width - 0.3 - len(verdict.word) / _OF_TITLE
+    title = textwrap.wrap("; ".join(claims), int(_OF_TITLE * room), max_lines=2, placeholder=" ...")
+    lines = [line for note in notes for line in textwrap.wrap(note, int(_CHARACTERS * width), max_lines=2)]
+    line, below = 0.14, 0.08  # inches
+    top = high - 0.06
+    for number, text in enumerate(title):
+        text = text[:1].upper() + text[1:] if not number else text
+        figure.text(0.012, (top - number * 0.17) / high, text, fontsize=10, weight="bold", va="top", parse_math=False)
+    fine = certificate.verdict == "certified" and verdict.exit_code == 0 and verdict.useful is not False
+    fine = fine and not claims[0].startswith(DEPENDS)
+    mark: dict[str, Any] = {"fontsize": 9, "weight": "bold", "ha": "right", "va": "top"}
+    figure.text(0.988, top / high, verdict.word, color=_GOOD if fine else _DOUBT, **mark)
+    begin = top - 0.17 * len(title) - 0.03
+    for number, text in enumerate(lines):
+        figure.text(0.012, (begin - number * line) / high, text, fontsize=7.5, color="0.25", va="top", parse_math=False)
+    used = high - begin + line * len(lines) + below
+    return used / (high - used)
+
+
+def _set(text: str) -> str:
+    """Return a text with the signs of print."""
+    return text.replace("<=", "\N{LESS-THAN OR EQUAL TO}").replace("||", "\N{DOUBLE VERTICAL LINE}")
+
+
+def _draw_graph(panel: SubFigure, certificate: Certificate, ends: np.ndarray) -> None:
+    """Draw who listens to whom, in the colours of final states; of a graph too large for that its final states."""
+    subject = certificate.family_proof.family if certificate.of_family else certificate.graph_proof.structure
+    if ends.size <= LABELLED_NODES:
+        beside = max(map(columns, certificate.labels)) > INSIDE  # labels reach beyond the nodes
+        ax = panel.add_axes((0.11, 0.16, 0.78, 0.82) if beside else (0.02, 0.16, 0.96, 0.82))
+        plot_graph(subject, ax=ax, colours=None if certificate.of_family else _colours(ends))
+        if (legend := ax.get_legend()) is not None:
+            texts, handles = [text.get_text() for text in legend.get_texts()], legend.legend_handles
+            legend.remove()
+            number = legend_columns(texts, panel.bbox.width / panel.dpi, 3)
+            narrow = {"columnspacing": 1, "handlelength": 1.5, "handletextpad": 0.5, "frameon": False}
+            panel.legend(handles, texts, loc="lower center", ncols=number, **narrow)
+    elif ends.size <= DRAWN_NODES:
+        plot_graph(subject, ax=new_axes(panel))
+    elif np.isfinite(ends).all():
+        plot_final_states(certificate, ax=new_axes(panel))
+
+
+def _draw_runs(
+    panel: SubFigure, certificate: Certificate, ends: np.ndarray, runs: Sequence[Any] | None, time_unit: str
+) -> None:
+    """Draw runs within what is proved of them; nothing where no initial state is known."""
+    part, late = certificate.proof.agents, certificate.proof.late
+    begins = certificate.initial_state if part is None else part.initial_state
+    if begins is None or (ends.size > REPEATED_NODES and certificate.trajectory is None):
+        return
+    with suppress(NothingDecays, SimulationError):
+        if part is not None and part.dimension == 2:
+            plot_formation(runs[0] if runs else certificate, ax=new_axes(panel))
+        elif certificate.of_family and (late is not None or certificate.proof.leaders_move):
+            plot_tracking(certificate, ax=new_axes(panel), time_unit=time_unit)
+        elif certificate.of_family:
+            plot_trajectory(certificate, ax=new_axes(panel), runs=runs or None, time_unit=time_unit)
+        elif part is None:
+            _draw_run(new_axes(panel), certificate, trajectory_of(certificate), ends, time_unit)
+        else:
+            run = agents_run(runs[0] if runs else certificate)
+            _draw_run(new_axes(panel), certificate, run, ends, time_unit)
+
+
+def _draw_run(ax: Axes, certificate: Certificate, run: Any, ends: np.ndarray, time_unit: str) -> None:
+    """Draw the run of every agent of one graph within its tube, with its final state at the end of its line."""
+    values = run.positions if isinstance(run, Trajectory) else run.states[:, 0, 0]
+    T, colours = float(run.protocol.gain.T), _colours(ends)
+    if len(values) > _LINES:
+        named = draw_agents(ax, run, values, certificate.graph_proof.structure)
+    else:
+        tubes = _tubes(certificate, run) if isinstance(run, Trajectory) else None
+        for k, colour in enumerate(colours):
+            ax.plot(run.t, values[k], color=colour, linewidth=1.3 if len(values) <= _NAMED else 0.8)
+            if tubes is not None:
+                low, high = tubes
+                ax.fill_between(run.t, low[k], high[k], color=colour, alpha=_SHADE / max(5, len(values)), linewidth=0)
+        named = dict(enumerate(colours))
+    low, high = float(values.min()), float(values.max())
+    room = 0.06 * (high - low) or 1.0
+    ax.set_ylim(low - room, high + room)
+    ax.axvline(T, color="black", linewidth=0.8, linestyle=":")
+    name_agents(ax, run, values, named, ends=True, until=1.04 * T, told=True)
+    ax.annotate(
+        f"$T$ = {near(run.protocol.gain.T)}",
+        (T, high + room),
+        (-3, -2),
+        textcoords="offset points",
+        ha="right",
+        va="top",
+        fontsize=7,
+    )
+    position = certificate.proof.agents is not None or certificate.proof.velocities is not None
+    finished(ax, time_label("time $t$", time_unit), "position" if position else "state $x_k$")
+
+
+def _tubes(certificate: Certificate, run: Trajectory) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return where every agent is proved to be at the instants of a run: bounds from below and above, (N, M) each."""
+    proof, late = certificate.graph_proof, certificate.proof.late
+    if proof.final_state is None:
+        return None
+    aims = np.asarray(proof.final_state, dtype=float)[:, None] if run.targets is None else run.targets
+    off = np.full(run.states.shape, np.inf)
+    if late is not None and late.says_something:
+        if late.vehicles is not None:
+            off = late.vehicles_over_time(run.t)[0]
+        else:
+            off[late.followers] = late.deviation_bound(run.t)
+            for one in late.of_all:
+                off = np.fmin(off, one.over_time(late.case, run.t).bound)
+    elif not certificate.limits and not proof.leaders_move:
+        off = proof.deviation_bound(np.clip(run.remaining, 0, 1))
+    places = np.zeros((len(off), 1)) if run.conditions.places is None else run.conditions.places[:, None]
+    return aims - off + places, aims + off + places
