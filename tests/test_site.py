@@ -14,17 +14,19 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
+import click
 import pytest
 from run_blocks import blocks, check_transcripts, run_page
 
 import lmi
 import ptcc_certify
+from ptcc_certify.cli import cli
 
 pytest.importorskip("sphinx", reason="the site needs the extra docs")
 
 from docstring_equations import literal
 from local_links import faults
-from reference_pages import write_reference
+from reference_pages import command_page, write_reference
 from sphinx.application import Sphinx
 
 ROOT = Path(__file__).parent.parent
@@ -88,6 +90,14 @@ def test_the_reference_has_every_public_name(tmp_path: Path):
     functions = {name for name in ptcc_certify._EXPORTS if callable(getattr(ptcc_certify, name))}
     assert {f"ptcc_certify.{name}" for name in functions} <= documented
     assert {name.rpartition(".")[2] for name in documented} >= set(ptcc_certify._EXPORTS)
+
+
+def test_the_page_of_the_command_line_has_every_option():
+    parts = command_page().split("\n## ptcc ")
+    for name, command in cli.commands.items():
+        (part,) = (part for part in parts if part.startswith(f"{name}\n"))
+        told = {p.opts[-1] for p in command.params if isinstance(p, click.Option) and not p.hidden}
+        assert told <= set(re.findall(r"^  (?:-\w, )?(--[\w-]+)", part, re.MULTILINE))
 
 
 def test_the_gallery_has_every_figure():

@@ -112,8 +112,8 @@ def lmi_page() -> str:
 
 
 def command_page() -> str:
-    """Return the page of the command line: what ``--help`` of every command prints."""
-    page = "# Command line\n\nWhat `ptcc --help` and `ptcc COMMAND --help` print.\n"
+    """Return the page of the command line: all options of every command."""
+    page = "# Command line\n\nWhat `ptcc --help` and `ptcc COMMAND --help` print; of many options `--help-all`.\n"
     group = cli.make_context("ptcc", [], resilient_parsing=True, max_content_width=100)
     for name in ("", *cli.list_commands(group)):
         command = cli.get_command(group, name) if name else cli

@@ -45,10 +45,13 @@ def _refuse_scenarios(context: click.Context, parameter: click.Parameter, patter
 def batch(pattern: tuple[str, ...], output: str | None, restart: bool, write_graphs: str | None, **options: Any) -> int:
     """Certify many graphs: a table with one row for each.
 
+    Every graph has a random initial state of its own, unless --x0 is given.
+
+    For example: ptcc batch 'graphs/*.csv' -o table.csv
+
     PATTERN is a file, a quoted pattern such as 'graphs/*.csv', a packaged graph, or SPEC.toml, which describes an
     ensemble of random graphs (keys: count, nodes, seed, connectivity, balanced, mean_degree, negative, weight_range,
-    weight_decades, undirected); several may be given. Every graph has a random initial state of its own, unless --x0 is
-    given.
+    weight_decades, undirected); several may be given.
 
     Rows are kept in FILE.journal as they come: after an interruption the same command goes on with those that are
     missing, and with files that have changed; the list of graphs may have changed too. FILE then has the rows so far.

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 @shared.reading_options
 @families.family_options
 @families.restricted_options
-@shared.expect_option("E.g. bipartite-consensus; exit code 3 if it does not follow.")
+@shared.expect_option("Such as bipartite-consensus; exit code 3 if refuted.")
 @one_of(Expectations, "min_rate")
 @one_of(Expectations, "max_input")
 @one_of(Asks, "at")
@@ -57,11 +57,15 @@ if TYPE_CHECKING:
 def certify(graph: tuple[str, ...], output: str | None, as_json: bool, screen: Screen, **options: Any) -> int:
     """Certify what the protocol does on GRAPH: behaviour, final state, error bound, input.
 
+    Exit code 0: certified, and everything asked holds.
+
+    For example: ptcc certify fig1b --T 2 --x0 5,2,-4,1,0,3 -o fig1b.json
+
     Of a family - several graphs with --switching, weights in intervals, --uncertainty, --optional - it certifies what
     holds for every signal.
 
     Prints 8 lines, 10 or so where the answers take more; -v tells rates, the Lyapunov functions searched and used,
-    proof obligations and the simulated run. Exit code 0: certified, and everything asked holds.
+    proof obligations and the simulated run.
     """
     from ptcc_certify.certificate import family_certification, graph_certification
     from ptcc_certify.certificate.assessment import CERTIFIED, rejects

@@ -11,7 +11,7 @@ from click.core import ParameterSource
 
 from lmi.exact.decimal_rounding import counted
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.click_options import flag_of
+from ptcc_certify.cli.click_options import Command, flag_of
 from ptcc_certify.cli.families import mode_options
 from ptcc_certify.cli.same_graph import READING, compare
 from ptcc_certify.cli.scenario import graph_of
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ptcc_certify.checker import CheckReport
 
 
-@click.command()
+@click.command(cls=Command)
 @shared.certificate_argument
 @click.argument("graph", nargs=-1, is_eager=True, callback=graph_of, type=click.Path())
 @shared.reading_options
@@ -44,12 +44,15 @@ def check(
 ) -> int:
     """Check CERTIFICATE exactly, without a solver; with GRAPH, that it speaks of this graph.
 
+    Exit code 0 if the claim is proved, 1 if it is rejected, 4 if the certificate itself says undecided.
+
+    For example: ptcc check fig1b.json fig1b
+
     CERTIFICATE is a file, or - for standard input (side files are then those in this folder). GRAPH is read as the
     options say, as by the other commands, or a scenario; never as the certificate says. Where that alone gives its
     graph, the check fails and names the options that would agree. Of a family name all its graphs, in any order.
-    Prints claim and verdict; -v tells every obligation with what was verified. Exit code 0 if the claim is proved, 1 if
-    it is rejected, 4 if the certificate itself says undecided. With --verified all that was not checked is named: exit
-    code 4 if a claim is among it; an undecided certificate is not read.
+    Prints claim and verdict; -v tells every obligation with what was verified. With --verified all that was not
+    checked is named: exit code 4 if a claim is among it; an undecided certificate is not read.
     `python -m ptcc_certify.checker` does the same, without other packages.
     """
     from ptcc_certify.certificate.checking import read_and_check

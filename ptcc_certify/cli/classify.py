@@ -15,7 +15,7 @@ from ptcc_certify.errors import ExitCode
 
 @click.command(cls=Command)
 @graphs_argument
-@expect_option("E.g. bipartite-consensus; exit code 3 if it does not follow.")
+@expect_option("Such as bipartite-consensus; exit code 3 if refuted.")
 @json_option
 @screen_options
 @reading_options
@@ -25,6 +25,8 @@ def classify(graph: tuple[str, ...], expect: str | None, as_json: bool, screen: 
 
     Of a family - several graphs with --switching, weights in intervals, --uncertainty, --optional - tell what it does
     for every signal, or why that depends on the signal.
+
+    For example: ptcc classify fig1b --expect bipartite-consensus
     """
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.graphs.structure import analyse

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
@@ -11,9 +12,10 @@ from typing import Any, ClassVar
 
 import click
 
-from ptcc_certify.errors import ParameterError, PTCCError
+from ptcc_certify.errors import ParameterError, PTCCError, did_you_mean
 from ptcc_certify.gain_design.request import DesignRequest
 from ptcc_certify.graphs.declared_option import Option, options_of
+from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import OPTIONAL, UNCERTAINTY, Reading
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.agents import Agents
@@ -63,16 +65,20 @@ SHORTEST = Option(
     example="true",
     kind="flag",
 )
-#: Everything that is declared, in the order of the sections and keys of a scenario.
-DECLARED = (
-    FILE,
-    *options_of(Reading).values(),
+#: What makes a family of graphs, and for which signals something is asked of it.
+OF_FAMILIES = (
     UNCERTAINTY,
     OPTIONAL,
     SIGNAL,
     options_of(DwellTime)["least"],
     CLOCK_DWELL,
     *options_of(JointWindows, ClockShares).values(),
+)
+#: Everything that is declared, in the order of the sections and keys of a scenario.
+DECLARED = (
+    FILE,
+    *options_of(Reading).values(),
+    *OF_FAMILIES,
     KIND,
     *options_of(NominalProtocol, SlidingModeProtocol, Agents, InitialState).values(),
     A0,
@@ -215,7 +221,7 @@ def together(*decorators: Decorator) -> Decorator:
 # ---------------------------------------------------------------------- help
 
 
-#: What the sections of a scenario, and of the help, are about.
+#: What the sections of a scenario are about.
 TITLES = {
     "graph": "Who listens to whom.",
     "protocol": "The protocol and its parameters; exact: 0.1 is 1/10, and 1/3 is written as a text.",
@@ -230,22 +236,108 @@ TITLES = {
     "simulation": "How ptcc simulate runs it.",
     "design": "What ptcc design asks, beside max_input and initial_bound.",
 }
+#: The topics of the help, in its order, and what they are about: sections of a scenario, families, and the rest.
+TOPICS = {
+    "graph": TITLES["graph"],
+    "families": "Families of graphs, uncertain weights, and their signals.",
+    **TITLES,
+    "files": "What is printed and written, and where the work is done.",
+}
+_TOPIC = {told.name: told.key.partition(".")[0] for told in DECLARED} | {told.name: "families" for told in OF_FAMILIES}
+
+
+def _show_help(context: click.Context, parameter: click.Parameter, topic: str | None) -> None:
+    """Print what ``--help``, ``--help TOPIC`` and ``--help-all`` ask for, and end."""
+    if topic is None or context.resilient_parsing:
+        return
+    command: Any = context.command
+    click.echo(command.get_help(context) if parameter is HELP_ALL else command.help_about(context, topic))
+    context.exit()
+
+
+_OF_HELP: dict[str, Any] = {"is_eager": True, "expose_value": False, "callback": _show_help}
+HELP = click.Option(
+    ["-h", "--help"],
+    is_flag=False,
+    flag_value="",
+    metavar="[TOPIC]",
+    help="Show this message, or the options of a topic.",
+    **_OF_HELP,
+)
+HELP_ALL = click.Option(["--help-all"], flag_value="all", help="Show all options.", **_OF_HELP)
 
 
 class Command(click.Command):
-    """A command whose help shows few options first, and the others by the sections of a scenario."""
+    """A command whose help shows few options first, and the others by topics."""
 
-    first: ClassVar[tuple[str, ...]] = ("kind", "T", "rho1", "rho2", "kappa", "x0", "seed", "edges", "expect")
+    #: What is shown first. Commands of few options show all at once.
+    first: ClassVar[tuple[str, ...]] = (
+        *("kind", "T", "rho1", "rho2", "kappa", "x0", "seed", "edges", "switching", "expect", "what", "stdlib"),
+        *("verified", "workers", "restart", "output", "as_json", "verbose", "port", "no_browser"),
+    )
+    few: ClassVar[int] = 15
 
-    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the options: few first, the others by their sections."""
-        sections = {told.name: told.key.partition(".")[0] for told in DECLARED if told.name not in self.first}
-        rows: dict[str, list[tuple[str, str]]] = {}
+    def get_help_option(self, ctx: click.Context) -> click.Option | None:
+        """Return ``--help``, which takes a topic where there are many options."""
+        return HELP if len(self.params) > self.few else super().get_help_option(ctx)
+
+    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
+        """Return all parameters, ``--help`` and ``--help-all`` at the end."""
+        params = super().get_params(ctx)
+        return [*params, HELP_ALL] if HELP in params else params
+
+    def rows_of_help(self, ctx: click.Context) -> dict[str, list[tuple[str, str]]]:
+        """Return the options by topics, in the order of the help; those shown first are under ``""``.
+
+        Examples
+        --------
+        >>> command = Command("sail", params=[click.Option([flag]) for flag in ("--T", "--delay", "--log")])
+        >>> list(command.rows_of_help(click.Context(command)))
+        ['', 'messages', 'files']
+        """
+        rows: dict[str, list[tuple[str, str]]] = {topic: [] for topic in ("", *TOPICS)}
         for parameter in self.get_params(ctx):
             row = parameter.get_help_record(ctx) if isinstance(parameter, click.Option) else None
             if row is not None:
-                rows.setdefault(sections.get(parameter.name or "", ""), []).append(row)
-        for section, title in {"": "Options", **TITLES}.items():
-            if section in rows:
-                with formatter.section(re.split("[.:;]", title)[0]):
-                    formatter.write_dl(rows[section])
+                name, of_help = parameter.name or "", not parameter.expose_value
+                rows["" if of_help or name in self.first else _TOPIC.get(name, "files")].append(row)
+        return {topic: found for topic, found in rows.items() if found}
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write all options: few first, the others by topics."""
+        for topic, rows in self.rows_of_help(ctx).items():
+            with formatter.section(_title(topic)):
+                formatter.write_dl(rows)
+
+    def help_about(self, ctx: click.Context, topic: str = "") -> str:
+        """Return what ``--help`` prints of a topic; without one the options shown first, and the topics.
+
+        A word that cannot be a topic, such as the file in ``--help graph.csv``, is an argument of the command.
+        """
+        from ptcc_certify.graphs.io.packaged import GRAPHS
+
+        rows = self.rows_of_help(ctx)
+        topics = [name for name in rows if name]
+        if topic not in topics and topic.isidentifier() and topic not in GRAPHS:
+            near = did_you_mean(topic, topics)
+            raise ParameterError(f'--help: there is no topic "{shorten(topic)}"{near}; topics: {", ".join(topics)}')
+        formatter = ctx.make_formatter()
+        self.format_usage(ctx, formatter)
+        if topic in topics:
+            with formatter.section(_title(topic)):
+                formatter.write_dl(rows[topic])
+            return formatter.getvalue().rstrip()
+        formatter.write_paragraph()
+        text, example, more = inspect.cleandoc(self.help or "").partition("\n\nFor example: ")
+        with formatter.indentation():
+            formatter.write_text(text + example + more.partition("\n\n")[0])
+        with formatter.section("Options"):
+            formatter.write_dl(rows[""], col_max=20)
+        with formatter.section(f"More options by topic, {ctx.command_path} --help TOPIC"):
+            formatter.write_dl([(name, _title(name)) for name in topics])
+        return formatter.getvalue().rstrip()
+
+
+def _title(topic: str) -> str:
+    """Return the line of a topic."""
+    return re.split("[.:;]", TOPICS.get(topic, "Options"))[0]

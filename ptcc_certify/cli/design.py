@@ -79,6 +79,9 @@ def design(graph: str, curve: str | None, output: str | None, as_json: bool, scr
     """Find gains of the nominal protocol whose input is proved to stay within a limit.
 
     The numbers printed are exact, and the last lines are the command that proves them again with exit code 0.
+
+    For example: ptcc design fig5b --max-input 10 --initial-bound 1 --deadline 9
+
     A saturation, a sample period, disturbances and noise are not searched under: give them to that command.
 
     Of agents of order n, from one initial state, the shortest deadline is searched, also under the sliding-mode

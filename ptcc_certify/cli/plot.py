@@ -65,16 +65,17 @@ class _Figure(click.Choice):  # type: ignore[type-arg]  # no generic class befor
 @click.option(
     "--what",
     type=_Figure([GLANCE, *OF_A_RUN, "graph", "spectrum", *OF_AGENTS, *OF_A_CERTIFICATE]),
-    help="Of a certificate a glance: who listens to whom, runs in their proved tubes, the bounds in words. States, "
-    "input, or error under its proved bounds over time (these three of families too); the graph, or the modes of a "
-    "family; eigenvalues of one graph. Agents of order n: motion, input, and in the plane formation. Certificates with "
-    "late messages: late; with moving leaders: tracking.  [default: of a certificate glance, else graph]",
+    metavar="FIGURE",
+    help="glance: of a certificate graph, runs and bounds at once; states, input, decay: of families too; graph, or the "
+    "modes of a family; spectrum: eigenvalues of one graph. Agents of order n: motion, input, and in the plane "
+    "formation. Certificates with late messages: late; with moving leaders: tracking.  [default: of a certificate "
+    "glance, else graph]",
 )
 @click.option(
     "-o",
     "--output",
     type=click.Path(dir_okay=False),
-    help="FILE.png, .pdf or .svg.  [default: NAME-WHAT.png, in this folder]",
+    help="FILE.png, .pdf or .svg.  [default: NAME-WHAT.png]",
 )
 @click.option("--wide", is_flag=True, help="As wide as two columns of a journal (states).")
 @shared.time_unit_option
@@ -93,9 +94,13 @@ def plot(
 ) -> int:
     """Draw one figure of a certificate, a graph, a family of graphs or a scenario.
 
-    A certificate is checked first, and its run is repeated; that of one without an initial state, as `design` makes,
-    begins at --x0. A graph is simulated, for its decay certified, with the options about protocol and initial state
-    that `certify` has too: only a certificate shows the input's bound.
+    A certificate is checked first, and its run is repeated.
+
+    For example: ptcc plot fig1b.json --what states -o states.pdf
+
+    The run of a certificate without an initial state, as `design` makes, begins at --x0. A graph is simulated, for its
+    decay certified, with the options about protocol and initial state that `certify` has too: only a certificate shows
+    the input's bound.
 
     Of a family - its certificate, or several graphs with --switching, weights in intervals, --uncertainty, --optional -
     runs under many signals are drawn within what is proved for every signal.

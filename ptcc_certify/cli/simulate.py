@@ -71,6 +71,8 @@ _TABLES = ("", ".csv", ".txt")
 def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | None, **options: Any) -> int:
     """Integrate the closed loop with CVODES up to the deadline and past it; print CSV or draw a figure.
 
+    For example: ptcc simulate fig1b --T 2 --x0 5,2,-4,1,0,3 -o run.png
+
     The columns are t, remaining (1 - t/T, accurate near the deadline), the state of every agent headed by its label,
     under the sliding-mode protocol sigma(<label>), and the input u(<label>). Near the deadline the infinite gain
     multiplies what the integrator leaves of the error: there u is rounding, which `ptcc plot --what input` leaves out.

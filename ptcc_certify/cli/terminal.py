@@ -93,7 +93,7 @@ def in_flags(sentence: Sentence) -> str:
 def screen_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add ``-v``, ``-q`` and ``--log``; the command is given its :class:`Screen` as the keyword ``screen``."""
 
-    @click.option("-v", "--verbose", is_flag=True, help="Print everything that is known, not the short screen alone.")
+    @click.option("-v", "--verbose", is_flag=True, help="Print all that is known, not the short screen alone.")
     @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors; the exit code tells.")
     @click.option("--log", metavar="FILE", help="Append to FILE what is done, step by step, with the seconds it takes.")
     @functools.wraps(command)

@@ -52,7 +52,7 @@ class Expectations:
     section: ClassVar = "expectations"
     behaviour: str | None = option(
         "--expect BEHAVIOUR",
-        "E.g. bipartite-consensus; exit code 3 if it does not follow.",
+        "Such as bipartite-consensus; exit code 3 if refuted.",
         example='"bipartite-consensus"',
         kind="text",
     )

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import inspect
+import re
+import shlex
 from collections import Counter
 from dataclasses import dataclass
 from fractions import Fraction
+from pathlib import Path
 from typing import Any, ClassVar
 
 import click
@@ -22,6 +25,8 @@ from ptcc_certify.model.parameters import Given
 
 pytestmark = pytest.mark.usefixtures("quick_search")
 
+#: Commands whose help has topics; ``certify`` comes first.
+BY_TOPIC = ("certify", "simulate", "plot", "design", "check", "batch", "classify")
 PARAMETERS = {name: {p.name: p for p in command.params} for name, command in cli.commands.items()}
 
 
@@ -60,16 +65,65 @@ def test_leaders_that_move_are_told_by_their_fields_alone():
     assert MovingLeaders(**given_of(MovingLeaders, options)) == MovingLeaders(speed="1/2")
 
 
-@pytest.mark.parametrize("command", ["certify", "simulate", "design"])
-def test_help_shows_few_options_first_and_the_others_by_sections(command: str):
-    text = ptcc(command, "--help").out
-    first, *others = text.partition("Options:")[2].split("\n\n")
-    assert 10 <= sum(line.startswith("  -") for line in first.splitlines()) <= 20
-    assert len(others) > 5
-    shown = " ".join(text.split())
-    for parameter in cli.commands[command].params:
-        if isinstance(parameter, click.Option) and not parameter.hidden:
-            assert parameter.opts[0] in shown
+def shown(text: str) -> list[str]:
+    """Return the long flags of the options that a help shows."""
+    return re.findall(r"^  (?:-\w, )?(--[\w-]+)", text.split("Options:\n")[-1], re.MULTILINE)
+
+
+@pytest.mark.parametrize("command", BY_TOPIC)
+def test_help_shows_few_options_first_and_each_of_the_others_under_one_topic(command: str):
+    first, _, listed = ptcc(command, "--help").out.partition("\n\nMore options by topic, ")
+    assert 5 <= len(shown(first)) <= 15 and len(f"{first}\n\n{listed}".splitlines()) <= 45
+    assert f"\n\n  For example: ptcc {command} " in first
+    topics = [line.split()[0] for line in listed.splitlines()[1:]]
+    pages = [ptcc(command, "--help", topic).out for topic in topics]
+    assert all(page.startswith(f"Usage: ptcc {command} ") and shown(page) for page in pages)
+    parameters = PARAMETERS[command].values()
+    told = [p.opts[-1] for p in parameters if isinstance(p, click.Option) and not p.hidden]
+    once = sorted([*told, "--help", "--help-all"])
+    assert sorted(flag for page in (first, *pages) for flag in shown(page)) == once
+    whole = ptcc(command, "--help-all").out
+    assert sorted(shown(whole)) == once and max(map(len, whole.splitlines())) <= 80
+
+
+@pytest.mark.parametrize("command", sorted({*cli.commands} - {*BY_TOPIC}))
+def test_commands_of_few_options_show_them_at_once(command: str):
+    assert "TOPIC" not in ptcc(command, "--help").out
+    assert "No such option '--help-all'" in ptcc(command, "--help-all").err
+
+
+def test_a_word_that_is_no_topic_is_refused_with_the_topics():
+    run = ptcc("check", "--help", "messages")  # of other commands
+    assert (run.code, run.out) == (2, "")
+    assert run.err == 'ptcc: --help: there is no topic "messages"; topics: graph, families, files\n'
+    assert "; did you mean messages?; topics: graph, " in ptcc("certify", "-h", "message").err
+
+
+def test_help_beside_arguments_runs_nothing_and_takes_none_of_them_for_a_topic(tmp_path: Path):
+    text, output = ptcc("certify", "--help").out, str(tmp_path / "c.json")
+    for words in (
+        "--help fig1b",
+        "-h highland_tribes",
+        "--help missing.csv",
+        "missing.csv -h",
+        "-h - --T 2",
+        "-h ../x",
+    ):
+        run = ptcc("certify", *words.split(), "-o", output)
+        assert (run.code, run.out, run.err) == (0, text, "")
+    page = ptcc("certify", "--help", "limits").out
+    assert page == ptcc("certify", "missing.csv", "--help=limits").out == ptcc("certify", "-h", "limits", "x.csv").out
+    assert not (tmp_path / "c.json").exists()
+
+
+def test_the_examples_of_the_help_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    Path("graphs").mkdir()
+    Path("graphs/pair.csv").write_text("a,b,1\nb,a,1\n")
+    for command in BY_TOPIC:  # certify writes what check and plot read
+        (example,) = re.findall("For example: ptcc (.*)", ptcc(command, "--help").out)
+        run = ptcc(*shlex.split(example))
+        assert run.code == 0, run
 
 
 @pytest.mark.parametrize("name", ["certify", "design", "design_agents", "certify_many", "read_graph"])

@@ -24,7 +24,7 @@ from ptcc_certify.report.plots.distributions import plot_final_states
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.graph_labels import INSIDE
 from ptcc_certify.report.plots.motion import agents_run, plot_formation
-from ptcc_certify.report.plots.style import STYLE, finished, legend_columns, new_axes, shown, time_label
+from ptcc_certify.report.plots.style import BOUND, STYLE, finished, legend_columns, new_axes, shown, time_label
 from ptcc_certify.report.plots.subject import read_back, trajectory_of
 from ptcc_certify.report.plots.tracking import plot_tracking
 from ptcc_certify.report.plots.trajectory import plot_trajectory
@@ -57,7 +57,8 @@ def plot_glance(subject: Any, *, runs: Sequence[Any] | None = None, words: bool 
     be, with its final state at the end of its line.
 
     Above 40 agents the graph is drawn as its matrix, and runs as ranges. Of families the runs are under many signals,
-    of vehicles in the plane their ways are drawn, and where nothing is known of an initial state the graph alone.
+    of vehicles in the plane their ways are drawn. Where no initial state is known it is what is left of the error from
+    every one, or the graph alone.
 
     Parameters
     ----------
@@ -95,10 +96,19 @@ def plot_glance(subject: Any, *, runs: Sequence[Any] | None = None, words: bool 
         panels: Any = figure
         if words:
             panels = figure.subfigures(2, 1, height_ratios=(_write(figure, certificate), 1))[1]
-        left, right = panels.subfigures(1, 2, width_ratios=(1, _RATIO))
         ends = _ends(certificate)
+        begins = (
+            certificate.initial_state if certificate.proof.agents is None else certificate.proof.agents.initial_state
+        )
+        if begins is None and not _bounded_for_all(certificate):
+            _draw_graph(panels.subfigures(1, 1), certificate, ends)
+            return shown(figure)
+        left, right = panels.subfigures(1, 2, width_ratios=(1, _RATIO))
         _draw_graph(left, certificate, ends)
-        _draw_runs(right, certificate, ends, runs, time_unit)
+        if begins is None:
+            _draw_error(new_axes(right), certificate, time_unit)
+        elif ends.size <= REPEATED_NODES or certificate.trajectory is not None:
+            _draw_runs(right, certificate, ends, runs, time_unit)
         return shown(figure)
 
 
@@ -179,11 +189,8 @@ def _draw_graph(panel: SubFigure, certificate: Certificate, ends: np.ndarray) ->
 def _draw_runs(
     panel: SubFigure, certificate: Certificate, ends: np.ndarray, runs: Sequence[Any] | None, time_unit: str
 ) -> None:
-    """Draw runs within what is proved of them; nothing where no initial state is known."""
+    """Draw runs within what is proved of them."""
     part, late = certificate.proof.agents, certificate.proof.late
-    begins = certificate.initial_state if part is None else part.initial_state
-    if begins is None or (ends.size > REPEATED_NODES and certificate.trajectory is None):
-        return
     with suppress(NothingDecays, SimulationError):
         if part is not None and part.dimension == 2:
             plot_formation(runs[0] if runs else certificate, ax=new_axes(panel))
@@ -196,6 +203,24 @@ def _draw_runs(
         else:
             run = agents_run(runs[0] if runs else certificate)
             _draw_run(new_axes(panel), certificate, run, ends, time_unit)
+
+
+def _bounded_for_all(certificate: Certificate) -> bool:
+    """Tell whether a share of the error is proved to be left, whatever the initial state."""
+    return not certificate.of_family and certificate.direct and bool(certificate.graph_proof.envelope.functions)
+
+
+def _draw_error(ax: Axes, certificate: Certificate, time_unit: str) -> None:
+    """Draw which share of the error is left at most, from every initial state."""
+    gain, envelope = certificate.protocol.gain, certificate.graph_proof.envelope
+    remaining = np.geomspace(1, 1e-6, 400)
+    share = np.array([envelope.residual(q) for q in remaining])
+    ax.plot(gain.time_at_tau(-np.log(remaining)), share, color=BOUND, linewidth=1.8)
+    ax.axvline(float(gain.T), color="black", linewidth=0.8, linestyle=":")
+    ax.set_yscale("log")
+    z = envelope.coordinates.replace("eps", r"\varepsilon")
+    ax.set_title("at most, from every initial state: proved", loc="left")
+    finished(ax, time_label("time $t$", time_unit), rf"$\|{z}(t)\| \,/\, \|{z}(0)\|$")
 
 
 def _draw_run(ax: Axes, certificate: Certificate, run: Any, ends: np.ndarray, time_unit: str) -> None:
