@@ -66,8 +66,8 @@ class _Figure(click.Choice):  # type: ignore[type-arg]  # no generic class befor
     "--what",
     type=_Figure([GLANCE, *OF_A_RUN, "graph", "spectrum", *OF_AGENTS, *OF_A_CERTIFICATE]),
     metavar="FIGURE",
-    help="glance: of a certificate graph, runs and bounds at once; states, input, decay: of families too; graph, or the "
-    "modes of a family; spectrum: eigenvalues of one graph. Agents of order n: motion, input, and in the plane "
+    help="glance: of a certificate graph, runs and bounds at once; states, input, decay: of families too; graph, or "
+    "the modes of a family; spectrum: eigenvalues of one graph. Agents of order n: motion, input, and in the plane "
     "formation. Certificates with late messages: late; with moving leaders: tracking.  [default: of a certificate "
     "glance, else graph]",
 )

@@ -70,7 +70,7 @@ def plot(subject: Any, what: str, **keywords: Any) -> Any:
     >>> from ptcc_certify.report.page_figures import plot
     >>> plot(None, "picture")
     Traceback (most recent call last):
-    ptcc_certify.errors.ParameterError: what = 'picture' is unknown; one of decay, input, graph, states, ...
+    ptcc_certify.errors.ParameterError: what = 'picture' is unknown; one of glance, decay, input, graph, ...
     """
     if what not in PLOTS:
         raise ParameterError("what", f"= {what!r} is unknown; one of {', '.join(PLOTS)}")
@@ -120,7 +120,7 @@ def draw(
         there["input"] = n <= TRACED_NODES and (slid or not saved.proof.constant)
     figures = _figures(saved, [name for name in wanted if there.get(name)])
     if "glance" in wanted and n <= DRAWN_NODES:
-        figures["glance"] = plot_glance(saved, words=False, runs=[agents_run] if agents_run else None)
+        figures |= _glance(saved, [agents_run] if agents_run else None)
     if agents_run is not None and saved.proof.agents is not None:
         figures["motion"] = plot_motion(agents_run)
         if saved.proof.agents.dimension == 2:
@@ -136,6 +136,13 @@ def _figures(saved: Certificate, names: Sequence[str], runs: Sequence[Trajectory
         with suppress(NothingDecays):
             figures[name] = PLOTS[name](saved, **taken).figure
     return figures
+
+
+def _glance(saved: Certificate, runs: Sequence[Any] | None) -> dict[str, Any]:
+    """Draw a certificate at a glance, unless it or its run is beyond floats."""
+    with suppress(ParameterError, SimulationError):
+        return {"glance": plot_glance(saved, words=False, runs=runs)}
+    return {}
 
 
 def run_of_agents(saved: Certificate) -> AgentsTrajectory | None:
@@ -160,7 +167,7 @@ def _draw_family(
         there["tracking" if proof.late.tracks else "late"] = True
     figures = _figures(saved, [name for name in wanted if there.get(name)], runs)
     if "glance" in wanted and proof.family.n_nodes <= DRAWN_NODES:
-        figures["glance"] = plot_glance(saved, words=False, runs=runs)
+        figures |= _glance(saved, runs)
     for number, (_, _, component, one) in enumerate(why):
         try:
             figures[f"why{number}"] = plot_counterexample(component, why=one, protocol=saved.protocol).figure

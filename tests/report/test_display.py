@@ -88,7 +88,7 @@ def test_each_is_shown_with_what_it_says_and_a_figure() -> None:
     assert "certified" in shown(cert).text
     read = ptcc.read_certificate(cert.to_dict())
     assert shown(read).images[0]["alt"] == shown(cert).images[0]["alt"] and read.trajectory is None
-    assert not shown(ptcc.read_certificate(certify(graph, PROTOCOL).to_dict())).images
+    assert shown(ptcc.read_certificate(certify(graph, PROTOCOL).to_dict())).images  # of every initial state
 
 
 def test_families_are_told_in_words_and_drawn() -> None:
@@ -111,7 +111,7 @@ def test_what_cannot_be_drawn_is_told_in_words() -> None:
     pair = load_graph("fig1b")
     still = SignedDigraph.from_edges([], nodes=["alone"])
     columns = simulate(pair, PROTOCOL, np.eye(6)[:, :2])
-    for value in (many, analyse(many), certify(pair, PROTOCOL, asks=Asks(simulation=False)), columns):
+    for value in (many, analyse(many), certify(many, PROTOCOL, asks=Asks(simulation=False)), columns):
         page = shown(value)
         assert not page.images and page.text.strip()
     assert "1 node, 0 edges" in shown(certify(still, PROTOCOL, [3])).text

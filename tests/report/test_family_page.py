@@ -203,7 +203,7 @@ def test_what_there_is_nothing_to_draw_of_is_left_out(family, x0, figures):
     saved = read_certificate(certify(family, PROTOCOL, x0).to_dict())
     page = report_html(saved, runs=sample_runs(saved, [RandomSignal(1)]))
     drawn = set(re.findall('id="figure-([a-z0-9]+)"', page))
-    assert drawn == ({"graph", "states", "input", "why0"} if figures is None else figures)
+    assert drawn == {"glance"} | ({"graph", "states", "input", "why0"} if figures is None else figures)
     assert r"\end{proposition}" in report_latex(saved)
 
 

@@ -171,7 +171,7 @@ def test_states_come_first_where_no_bound_of_a_decay_is_proved():
     cert = certify_family(Family.from_intervals(edges), NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2, 3, 4])
     assert cert.main_figure == "states"
     runs = sample_runs(cert, [RandomSignal(1)])
-    assert cert.plot(runs=runs).get_ylabel() == cert.plot("states", runs=runs).get_ylabel()
+    assert cert.plot(runs=runs).axes[-1].get_ylabel() == cert.plot("states", runs=runs).get_ylabel()
 
 
 def test_a_certificate_draws_its_figures_by_name(drawn):

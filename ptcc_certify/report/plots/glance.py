@@ -42,6 +42,8 @@ _TOLD = (("late", "tracking", "error"), ("input",))
 _GOOD, _DOUBT = "#117733", "#8A5A00"
 #: Characters of an inch of text; of the title, which is larger.
 _CHARACTERS, _OF_TITLE = 16.5, 12.5
+#: The least share of the error that is drawn.
+_LEAST = 1e-9
 #: How dark tubes of all agents are together.
 _SHADE = 0.7
 #: Agents of which every one has a line; runs of more are drawn as ranges. Ends that are named.
@@ -115,13 +117,17 @@ def plot_glance(subject: Any, *, runs: Sequence[Any] | None = None, words: bool 
 def _ends(certificate: Certificate) -> np.ndarray:
     """Return the final state of every agent, (N,): of an interval its middle, NaN where none is proved."""
     part = certificate.proof.agents
+    known: list[Any] = []
     if part is not None:  # of agents of order n that of positions; in several dimensions there is no one number
         known = [agent[0][0][0] for agent in part.final_state or ()] if part.dimension == 1 else []
     elif certificate.of_family:
         known = [end if end is None else sum(end) / 2 for end in certificate.final_state or ()]
-    else:
-        known = [] if certificate.final_state is None else list(np.asarray(certificate.final_state))
-    ends = [np.nan if end is None else float(end) for end in known]
+    elif certificate.final_state is not None:
+        known = list(certificate.final_state.states)
+    try:
+        ends = [np.nan if end is None else float(end) for end in known]
+    except OverflowError:
+        raise ParameterError("a final state is beyond the range of float64; nothing is drawn of it") from None
     return np.array(ends or [np.nan] * len(certificate.labels))
 
 
@@ -218,6 +224,7 @@ def _draw_error(ax: Axes, certificate: Certificate, time_unit: str) -> None:
     ax.plot(gain.time_at_tau(-np.log(remaining)), share, color=BOUND, linewidth=1.8)
     ax.axvline(float(gain.T), color="black", linewidth=0.8, linestyle=":")
     ax.set_yscale("log")
+    ax.set_ylim(max(float(share.min()), _LEAST), 1.5 * float(share.max()))
     z = envelope.coordinates.replace("eps", r"\varepsilon")
     ax.set_title("at most, from every initial state: proved", loc="left")
     finished(ax, time_label("time $t$", time_unit), rf"$\|{z}(t)\| \,/\, \|{z}(0)\|$")
