@@ -97,7 +97,7 @@ def plot_glance(subject: Any, *, runs: Sequence[Any] | None = None, words: bool 
         figure = Figure(SIZE if words else (SIZE[0], SIZE[1] - 0.7), layout="constrained")
         panels: Any = figure
         if words:
-            panels = figure.subfigures(2, 1, height_ratios=(_write(figure, certificate), 1))[1]
+            _, panels = figure.subfigures(2, 1, height_ratios=(_write(figure, certificate), 1))  # type: ignore[misc]
         ends = _ends(certificate)
         begins = (
             certificate.initial_state if certificate.proof.agents is None else certificate.proof.agents.initial_state
@@ -121,9 +121,10 @@ def _ends(certificate: Certificate) -> np.ndarray:
     if part is not None:  # of agents of order n that of positions; in several dimensions there is no one number
         known = [agent[0][0][0] for agent in part.final_state or ()] if part.dimension == 1 else []
     elif certificate.of_family:
-        known = [end if end is None else sum(end) / 2 for end in certificate.final_state or ()]
-    elif certificate.final_state is not None:
-        known = list(certificate.final_state.states)
+        ends_of_family = certificate.family_proof.final_positions
+        known = [None if end is None else sum(end) / 2 for end in ends_of_family or ()]
+    elif certificate.graph_proof.final_positions is not None:
+        known = list(certificate.graph_proof.final_positions.states)
     try:
         ends = [np.nan if end is None else float(end) for end in known]
     except OverflowError:
@@ -181,10 +182,11 @@ def _draw_graph(panel: SubFigure, certificate: Certificate, ends: np.ndarray) ->
         ax = panel.add_axes((0.11, 0.16, 0.78, 0.82) if beside else (0.02, 0.16, 0.96, 0.82))
         plot_graph(subject, ax=ax, colours=None if certificate.of_family else _colours(ends))
         if (legend := ax.get_legend()) is not None:
-            texts, handles = [text.get_text() for text in legend.get_texts()], legend.legend_handles
+            texts = [text.get_text() for text in legend.get_texts()]
+            handles: Any = legend.legend_handles
             legend.remove()
             number = legend_columns(texts, panel.bbox.width / panel.dpi, 3)
-            narrow = {"columnspacing": 1, "handlelength": 1.5, "handletextpad": 0.5, "frameon": False}
+            narrow: dict[str, Any] = {"columnspacing": 1, "handlelength": 1.5, "handletextpad": 0.5, "frameon": False}
             panel.legend(handles, texts, loc="lower center", ncols=number, **narrow)
     elif ends.size <= DRAWN_NODES:
         plot_graph(subject, ax=new_axes(panel))
@@ -244,14 +246,14 @@ def _draw_run(ax: Axes, certificate: Certificate, run: Any, ends: np.ndarray, ti
                 low, high = tubes
                 ax.fill_between(run.t, low[k], high[k], color=colour, alpha=_SHADE / max(5, len(values)), linewidth=0)
         named = dict(enumerate(colours))
-    low, high = float(values.min()), float(values.max())
-    room = 0.06 * (high - low) or 1.0
-    ax.set_ylim(low - room, high + room)
+    least, most = float(values.min()), float(values.max())
+    room = 0.06 * (most - least) or 1.0
+    ax.set_ylim(least - room, most + room)
     ax.axvline(T, color="black", linewidth=0.8, linestyle=":")
     name_agents(ax, run, values, named, ends=True, until=1.04 * T, told=True)
     ax.annotate(
         f"$T$ = {near(run.protocol.gain.T)}",
-        (T, high + room),
+        (T, most + room),
         (-3, -2),
         textcoords="offset points",
         ha="right",
