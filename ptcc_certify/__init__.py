@@ -100,6 +100,8 @@ _EXPORTS = {
     "Ensemble": "graphs.ensembles",
     "certify_many": "batch",
     # Figures
+    "plot_glance": "report.plots.glance",
+    "animate": "report.plots.animation",
     "plot_motion": "report.plots.motion",
     "plot_formation": "report.plots.motion",
     "plot_trajectory": "report.plots.trajectory",

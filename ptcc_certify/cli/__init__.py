@@ -18,6 +18,7 @@ from typing import Any
 import click
 
 from ptcc_certify.cli import (
+    animate,
     batch,
     certify,
     check_and_report,
@@ -58,6 +59,7 @@ GROUPS: dict[str, dict[click.Command, str]] = {
         check_and_report.check: "Check a certificate exactly, without a solver.",
         check_and_report.report: "Write a page, or LaTeX, to send to somebody.",
         plot.plot: "Draw a figure of a certificate or a graph.",
+        animate.animate: "Make a film of a certificate.",
     },
     "Set up and learn": {
         new.new: "Write a commented scenario file to begin with.",

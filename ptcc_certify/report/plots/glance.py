@@ -21,7 +21,7 @@ from ptcc_certify.report.facts.of_certificate import facts_of
 from ptcc_certify.report.plots.camp_lines import draw_agents, name_agents
 from ptcc_certify.report.plots.decay import NothingDecays
 from ptcc_certify.report.plots.distributions import plot_final_states
-from ptcc_certify.report.plots.graph import plot_graph
+from ptcc_certify.report.plots.graph import node_id, plot_graph
 from ptcc_certify.report.plots.graph_labels import INSIDE
 from ptcc_certify.report.plots.motion import agents_run, plot_formation
 from ptcc_certify.report.plots.style import BOUND, STYLE, finished, legend_columns, new_axes, shown, time_label
@@ -132,9 +132,16 @@ def _ends(certificate: Certificate) -> np.ndarray:
     return np.array(ends or [np.nan] * len(certificate.labels))
 
 
-def _colours(ends: np.ndarray) -> list[str]:
-    """Return the colours of final states; grey of those that are not known."""
-    largest = float(np.nanmax(np.abs(ends), initial=0)) or 1.0
+def colours_of(ends: np.ndarray, largest: float | None = None) -> list[str]:
+    """Return the colours of states up to a largest one, by default theirs; grey of those that are not known.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.glance import colours_of
+    >>> colours_of(np.array([2.0, 0.0, -2.0]))
+    ['#005a9c', '#6a6a6a', '#a84300']
+    """
+    largest = largest or float(np.nanmax(np.abs(ends), initial=0)) or 1.0
     return [to_hex(colour) for colour in ENDS(Normalize(-largest, largest)(np.nan_to_num(ends)))]
 
 
@@ -180,7 +187,7 @@ def _draw_graph(panel: SubFigure, certificate: Certificate, ends: np.ndarray) ->
     if ends.size <= LABELLED_NODES:
         beside = max(map(columns, certificate.labels)) > INSIDE  # labels reach beyond the nodes
         ax = panel.add_axes((0.11, 0.16, 0.78, 0.82) if beside else (0.02, 0.16, 0.96, 0.82))
-        plot_graph(subject, ax=ax, colours=None if certificate.of_family else _colours(ends))
+        plot_graph(subject, ax=ax, colours=None if certificate.of_family or np.isnan(ends).all() else colours_of(ends))
         if (legend := ax.get_legend()) is not None:
             texts = [text.get_text() for text in legend.get_texts()]
             handles: Any = legend.legend_handles
@@ -235,13 +242,14 @@ def _draw_error(ax: Axes, certificate: Certificate, time_unit: str) -> None:
 def _draw_run(ax: Axes, certificate: Certificate, run: Any, ends: np.ndarray, time_unit: str) -> None:
     """Draw the run of every agent of one graph within its tube, with its final state at the end of its line."""
     values = run.positions if isinstance(run, Trajectory) else run.states[:, 0, 0]
-    T, colours = float(run.protocol.gain.T), _colours(ends)
+    T, colours = float(run.protocol.gain.T), colours_of(ends)
     if len(values) > _LINES:
         named = draw_agents(ax, run, values, certificate.graph_proof.structure)
     else:
         tubes = _tubes(certificate, run) if isinstance(run, Trajectory) else None
         for k, colour in enumerate(colours):
-            ax.plot(run.t, values[k], color=colour, linewidth=1.3 if len(values) <= _NAMED else 0.8)
+            width = 1.3 if len(values) <= _NAMED else 0.8
+            ax.plot(run.t, values[k], color=colour, linewidth=width, gid=node_id(k))
             if tubes is not None:
                 low, high = tubes
                 ax.fill_between(run.t, low[k], high[k], color=colour, alpha=_SHADE / max(5, len(values)), linewidth=0)

@@ -286,7 +286,7 @@ def _draw_coloured(
     for k, (p, colour) in enumerate(zip(place, colours, strict=True)):
         marker, size = _SHAPES.get(groups[k], ("o", 1.0))
         edge = outline if k in leads else {"markeredgewidth": 0}
-        ax.plot(*p, marker, markersize=2 * radius * size, color=colour, zorder=3, **edge)
+        ax.plot(*p, marker, markersize=2 * radius * size, color=colour, zorder=3, gid=node_id(k), **edge)
     if 0 < len(leads) < len(groups):
         ax.plot([], [], "o", color="white", markersize=6, label="leads", **outline)
     for name, (marker, _) in _SHAPES.items():
@@ -320,6 +320,18 @@ def _draw_arrows(
         ax.plot([], [], color="black", alpha=0.3, linewidth=4, label=f"uncertain weight{alone}")
     if any(not least for _, least in edges):
         ax.plot([], [], color="black", linestyle=":", linewidth=1.1, label="may fail")
+
+
+def node_id(k: int) -> str:
+    """Return what the mark of an agent, and its line, are known by in a figure.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.graph import node_id
+    >>> node_id(3)
+    'agent-3'
+    """
+    return f"agent-{k}"
 
 
 def fit_height(ax: Axes, boxes: np.ndarray, radius: float) -> None:

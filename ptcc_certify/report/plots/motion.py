@@ -24,6 +24,7 @@ from ptcc_certify.report.plots.camp_lines import (
     draw_deadlines,
     name_agents,
 )
+from ptcc_certify.report.plots.graph import node_id
 from ptcc_certify.report.plots.style import SINGLE_COLUMN, axes_of, finished, new_axes, shown, styled, time_label
 from ptcc_certify.report.plots.subject import read_back
 from ptcc_certify.report.text_layout import printable, shorten_text
@@ -175,7 +176,7 @@ def plot_formation(subject: Any, *, ax: Axes | None = None) -> Axes:
     width = 1.0
     for k, style in camp_lines(groups, range(len(groups))):
         (x, y), color = run.positions[k], style["color"]
-        ax.plot(x, y, linewidth=width, **style)
+        ax.plot(x, y, linewidth=width, gid=node_id(k), **style)
         ax.plot(x[0], y[0], "o", markersize=3.5, markerfacecolor="white", markeredgecolor=color, zorder=4)
         ax.plot(x[-1], y[-1], "o", markersize=4.5, color=color, zorder=5)
     ax.set_aspect("equal", adjustable="datalim")
