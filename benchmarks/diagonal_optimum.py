@@ -43,7 +43,7 @@ import lmi
 SIZES = (50, 100, 150, 300, 600, 1000, 2000)
 OURS, RATE = "ours", "ours, best rate"
 PEERS = {"Clarabel": "CLARABEL", "SDPA": "SDPA", "CVXOPT": "CVXOPT", "SCS": "SCS"}
-PACKAGES = ("numpy", "scipy", "cvxpy", "clarabel", "sdpa-python", "cvxopt", "scs")
+PACKAGES = ("numpy", "scipy", "clarabel", "sdpa-python", "cvxopt", "scs")
 #: Binary places of weights, of ``omega`` and of ``t``: the products are floats without rounding.
 WEIGHT_PLACES, OMEGA_PLACES, T_PLACES = 10, 30, 40
 LOSSES = (1e-10, 1e-9, 1e-8, 1e-7, 1e-6)
@@ -167,7 +167,9 @@ def machine() -> str:
 
 
 def versions() -> str:
-    found = [f"Python {platform.python_version()}"]
+    import cvxpy  # is of the distribution cvxpy-base, or of cvxpy, or of both
+
+    found = [f"Python {platform.python_version()}", f"cvxpy {cvxpy.__version__}"]
     for package in PACKAGES:
         try:
             found.append(f"{package} {importlib.metadata.version(package)}")

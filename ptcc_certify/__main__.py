@@ -2,6 +2,10 @@
 
 import sys
 
+#: Modules that two distributions share: uninstalling one takes the files of both away, and pip takes the other for
+#: whole.
+_SHARED = {"cvxpy": "pip uninstall -y cvxpy-base && pip install cvxpy-base"}
+
 
 def main() -> None:
     """Run ``ptcc``; where a package is missing tell so, and what works without any."""
@@ -10,7 +14,8 @@ def main() -> None:
 
         run()
     except ModuleNotFoundError as error:
-        what = f"ptcc needs the package {error.name}, which is not installed; pip install . in the project's folder"
+        mend = _SHARED.get((error.name or "").partition(".")[0], "pip install . in the project's folder")
+        what = f"ptcc needs the package {error.name}, which is not installed; {mend}"
         without = "without other packages: python -m ptcc_certify.checker CERTIFICATE"
         print(f"ptcc: {what}; {without}", file=sys.stderr)
         sys.exit(2)

@@ -258,6 +258,14 @@ def test_a_package_that_is_missing_is_named_with_the_check_that_needs_none(certi
         assert "python -m ptcc_certify.checker" in run.err
 
 
+def test_the_module_that_two_distributions_share_is_told_back_by_reinstalling():
+    """``pip install .`` leaves it as it is: ``cvxpy-base`` counts as installed, though ``cvxpy`` took its files."""
+    code = "import sys; sys.modules['cvxpy'] = None; from ptcc_certify.__main__ import main; main()"
+    run = process("-c", code, "certify", "team.csv", "--uncertainty", "10%")
+    assert run.code == 2 and run.err.startswith("ptcc: ptcc needs the package cvxpy, which is not installed; "), run
+    assert "; pip uninstall -y cvxpy-base && pip install cvxpy-base; " in run.err and len(run.err.splitlines()) == 1
+
+
 def test_a_run_tells_what_was_written_and_meets_noise():
     words = ("simulate", "team.csv", "--gain-cap", "20", "--noise", "0.1", "-o", "run.csv")
     assert ptcc(*words).out == "written    run.csv\n"
