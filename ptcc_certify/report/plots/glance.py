@@ -283,6 +283,9 @@ def _tubes(certificate: Certificate, run: Trajectory) -> tuple[np.ndarray, np.nd
         if late.vehicles is not None:
             off = late.vehicles_over_time(run.t)[0]
         else:
+            off[[v for c in proof.structure.closed_components if len(c.nodes) == 1 for v in c.nodes]] = (
+                0  # aims themselves
+            )
             off[late.followers] = late.deviation_bound(run.t)
             for one in late.of_all:
                 off = np.fmin(off, one.over_time(late.case, run.t).bound)

@@ -1,0 +1,105 @@
+"""A certificate at a glance, and in motion: what is drawn is what is proved, and what runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bad_inputs import ptcc as command
+from matplotlib.colors import to_rgb
+from PIL import Image
+
+import ptcc_certify as ptcc
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.report.plots.animation import animate
+from ptcc_certify.report.plots.glance import ENDS, colours_of, plot_glance
+from ptcc_certify.report.plots.graph import node_id
+
+CORPUS = Path(__file__).parents[1] / "corpus"
+KINDS = ["fig3a", "late", "late-moving", "vehicles", "group-vehicles", "formation", "sliding", "single", "parts"]
+
+
+def certificate(name: str) -> ptcc.Certificate:
+    return ptcc.read_certificate(CORPUS / f"{name}.json")
+
+
+@pytest.mark.few(3)
+@pytest.mark.parametrize("name", KINDS)
+def test_every_run_is_drawn_inside_its_tube(name: str) -> None:
+    figure = plot_glance(certificate(name))
+    ax = figure.axes[1]
+    lines = {line.get_gid(): line for line in ax.lines if line.get_gid()}
+    assert len(lines) == len(certificate(name).labels) == len(ax.collections)
+    room = 1e-6 * np.ptp(ax.get_ylim())
+    for k, tube in enumerate(ax.collections):
+        (path,) = tube.get_paths()
+        t, x = lines[node_id(k)].get_data()
+        half = (len(path.vertices) - 3) // 2
+        rims = path.vertices[1 : half + 1], path.vertices[half + 2 : -1][::-1]
+        low, high = (np.interp(t, rim[:, 0], rim[:, 1]) for rim in rims)
+        least, most = np.minimum(low, high), np.maximum(low, high)
+        assert (least - room <= x).all() and (x <= most + room).all(), k
+
+
+def test_colours_tell_the_sign_of_a_state_and_are_legible_on_white_and_under_white() -> None:
+    red, grey, blue = (np.array(to_rgb(colour)) for colour in colours_of(np.array([-3.0, 0.0, 3.0])))
+    assert red[0] > red[2] and blue[2] > blue[0] and np.ptp(grey) == 0
+    for share in np.linspace(0, 1, 101):
+        linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in ENDS(share)[:3]]
+        luminance = float(np.dot([0.2126, 0.7152, 0.0722], linear))
+        assert 1.05 / (luminance + 0.05) >= 4.5
+
+
+def test_final_states_stand_at_the_ends_of_lines_each_its_own() -> None:
+    texts = [text.get_text() for text in plot_glance(certificate("fig5a")).axes[1].texts]
+    ends = {text.rpartition(": ")[0]: float(text.rpartition(": ")[2]) for text in texts if ": " in text}
+    final = certificate("fig5a").final_state
+    for names, value in ends.items():
+        for name in names.split(", "):
+            assert abs(float(final[name]) - value) <= 0.01, name
+    assert sum(len(names.split(", ")) for names in ends) == 16
+
+
+def test_words_say_the_claim_and_the_bounds() -> None:
+    texts = [text.get_text() for text in plot_glance(certificate("fig3a")).texts]
+    assert texts[0] == "Interval bipartite consensus at T = 0.6 (Theorem 2.1)" and "certified" in texts
+    assert any("every agent within 1.3e-06" in text for text in texts)
+    assert not plot_glance(certificate("fig3a"), words=False).texts
+
+
+@pytest.mark.parametrize("name", ["no-initial-state", "windows", "family-late", "core", "undecided", "plane"])
+def test_every_kind_has_a_glance(name: str) -> None:
+    read = ptcc.read_certificate(CORPUS / f"{name}.json")
+    assert plot_glance(read).axes
+
+
+def test_a_film_shows_the_run_and_ends_where_it_ends(tmp_path: Path) -> None:
+    animate(certificate("single"), tmp_path / "run.gif", seconds=0.3)
+    with Image.open(tmp_path / "run.gif") as film:
+        assert film.n_frames >= 2
+    animate(certificate("plane"), tmp_path / "run.html", seconds=0.2)
+    assert "<input" in (tmp_path / "run.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("name", "file", "seconds", "why"),
+    [
+        ("fig3a", "run.png", 1, "films are written to"),
+        ("fig3a", "run.gif", 0, "seconds = 0"),
+        ("windows", "run.gif", 1, "of one graph"),
+        ("core", "run.gif", 1, "at most 40 agents"),
+    ],
+)
+def test_what_has_no_film_is_told(name: str, file: str, seconds: float, why: str, tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match=why):
+        animate(certificate(name), tmp_path / file, seconds=seconds)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_command_makes_a_film(tmp_path: Path) -> None:
+    file = str(CORPUS / "single.json")
+    made = command("animate", file, "-o", str(tmp_path / "a.gif"), "--seconds", "0.2")
+    assert made.code == 0 and made.out.startswith("written") and (tmp_path / "a.gif").stat().st_size
+    refused = command("animate", file, "-o", str(tmp_path / "a.txt"))
+    assert refused.code == 2 and refused.err.count("\n") == 1
