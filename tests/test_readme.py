@@ -58,7 +58,8 @@ def test_python_runs(code: str):
     assert done.stdout.strip()
 
 
-def test_the_transcript_is_what_ptcc_prints():
+def test_the_transcript_is_what_ptcc_prints(folder: Path):
+    run_commands(next(line for line in SESSIONS[0].splitlines() if line.startswith("printf ")), folder)
     assert check_transcripts(TEXT) == 1
 
 
@@ -70,12 +71,21 @@ def test_the_set_up_commands_are_there():
     assert "\npytest\n" in (README.parent / ".ci" / "run").read_text(encoding="utf-8")  # as the README says it
 
 
-def test_the_packaged_graphs_and_the_theorem_table_are_complete():
-    assert [row.split("|")[4].strip() for row in TEXT.splitlines() if re.search(r"\| \d\.\d \|$", row)] == [
-        "1.1",
-        "1.2",
-        "2.1",
-        "2.2",
-        "3.1",
-        "3.2",
-    ]
+def test_what_goes_together_is_as_the_page_tells_it():
+    """Pairs that are certified, and those that are not."""
+    page = (README.parent / "docs" / "guide" / "what-goes-together.md").read_text(encoding="utf-8")
+    told = _table(page.partition("## Where a and b")[0])
+    mine = _table(TEXT.partition("## What goes together")[2].partition("## More")[0])
+    named = {"disturbances": "disturbances without it"}
+    of_page = [next(k for k, (name, _) in told.items() if name == named.get(own, own)) for own, _ in mine.values()]
+    for row, (_, cells) in mine.items():
+        for column in range(1, row):
+            pair = sorted((of_page[row - 1], of_page[column - 1]))
+            certified = told[pair[1]][1][pair[0] - 1] == "+"
+            assert (cells[column - 1] == "+") is certified, (row, column)
+
+
+def _table(text: str) -> dict[int, tuple[str, list[str]]]:
+    """Return the rows of a triangular table by their numbers: the name, and the cells."""
+    rows = re.findall(r"^\| ?(\d+) ?\|? ([^|]+)\|(.*)\|$", text, re.MULTILINE)
+    return {int(number): (name.strip(), [cell.strip() for cell in cells.split("|")]) for number, name, cells in rows}

@@ -125,7 +125,7 @@ class _Scene:
         self.time.set_text(f"$t$ = {min(t, self.T):.3g} of {near(self.run.protocol.gain.T)}")
         self.canvas.restore_region(self.still)
         for artist in self.moving:
-            artist.axes.draw_artist(artist)
+            artist.axes.draw_artist(artist)  # type: ignore[union-attr]
         return np.array(self.canvas.buffer_rgba())
 
 

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure, SubFigure
 
 from lmi.exact.decimal_rounding import near
 from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.fact import Fact
 from ptcc_certify.errors import ParameterError, SimulationError, spell
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, LABELLED_NODES, REPEATED_NODES
 from ptcc_certify.report.facts.of_certificate import facts_of
@@ -148,7 +149,6 @@ def colours_of(ends: np.ndarray, largest: float | None = None) -> list[str]:
 def _write(figure: Figure, certificate: Certificate) -> float:
     """Write the claim, the verdict and the bounds above the panels; return the share of the height that they take."""
     facts = [fact for fact in facts_of(certificate, details=False) if not fact.detail]
-    claims = [spell(fact.note) for fact in facts if fact.head == "claim"]
     told = [
         next(([f for f in facts if f.head == head] for head in heads if any(f.head == head for f in facts)), [])
         for heads in _TOLD
@@ -158,6 +158,7 @@ def _write(figure: Figure, certificate: Certificate) -> float:
     verdict = certificate.assessment
     width, high = SIZE
     room = width - 0.3 - len(verdict.word) / _OF_TITLE
+    claims = [_fitting(fact, int(_OF_TITLE * room)) for fact in facts if fact.head == "claim"]
     title = textwrap.wrap("; ".join(claims), int(_OF_TITLE * room), max_lines=2, placeholder=" ...")
     lines = [line for note in notes for line in textwrap.wrap(note, int(_CHARACTERS * width), max_lines=2)]
     line, below = 0.14, 0.08  # inches
@@ -174,6 +175,12 @@ def _write(figure: Figure, certificate: Certificate) -> float:
         figure.text(0.012, (begin - number * line) / high, text, fontsize=7.5, color="0.25", va="top", parse_math=False)
     used = high - begin + line * len(lines) + below
     return used / (high - used)
+
+
+def _fitting(fact: Fact, characters: int) -> str:
+    """Return the first of the shorter texts of a fact that fits a line, or the last; else its sentence."""
+    texts = [spell(text) for text in fact.brief or (fact.note,)]
+    return next((text for text in texts if len(text) <= characters), texts[-1])
 
 
 def _set(text: str) -> str:
