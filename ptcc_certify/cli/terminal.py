@@ -106,11 +106,28 @@ def screen_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return wrapped
 
 
+#: Colours of verdicts, by how they begin; others, such as ``left open``, are yellow.
+_COLOURS = {("certified;", "met", "accepted"): "green", ("refuted", "violated", "rejected", "not met"): "red"}
+
+
 def print_lines(*lines: str, err: bool = False) -> None:
-    """Print lines; what would steer a terminal, in the name of a file or a node, is shown as ``?``."""
+    """Print lines; what would steer a terminal, in the name of a file or a node, is shown as ``?``.
+
+    A verdict has the colour of what it says, where the terminal has colours and ``NO_COLOR`` is not set.
+    """
     from ptcc_certify.report.text_layout import printable
 
-    click.echo("\n".join(map(printable, lines)), err=err)
+    click.echo("\n".join(_coloured(printable(line)) for line in lines), err=err)
+
+
+def _coloured(line: str) -> str:
+    """Return a line of the screen, a verdict in its colour; what goes to a file is printed without."""
+    head, _, text = line.partition(" ")
+    if head.lower() not in ("verdict", "accepted", "rejected") or os.environ.get("NO_COLOR"):
+        return line
+    said = text.strip() if head.lower() == "verdict" else head
+    colour = next((colour for words, colour in _COLOURS.items() if said.startswith(words)), "yellow")
+    return click.style(line, fg=colour, bold=True)
 
 
 def _on_terminal(stream: Any) -> bool:

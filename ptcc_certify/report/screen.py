@@ -50,12 +50,12 @@ def long_screen(facts: Iterable[Fact], name: Spelling = str) -> list[str]:
 
 
 def entries(facts: Iterable[Fact], name: Spelling = str, brief: bool = False) -> Iterator[tuple[str, str]]:
-    """Yield head and text of each fact; of those of one head the first alone has it.
+    """Yield head and text of each fact, the verdict first; of those of one head the first alone has it.
 
     Where it is to be ``brief``, the text is the first of the shorter ones that fits a line, or the last.
     """
     last = ""
-    for fact in facts:
+    for fact in sorted(facts, key=lambda fact: fact.head != "verdict"):
         head = fact.head.upper() if fact.loud else fact.head
         texts = [spell(text, name) for text in (brief and fact.brief) or (fact.note,)]
         yield "" if head == last else head, next((text for text in texts if columns(text) <= TEXT), texts[-1])
