@@ -85,6 +85,7 @@ def summary_lines(
     >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
     >>> cert = certify(foes, NominalProtocol(T=1, rho1=1, rho2=2, kappa=1), [3, 5], asks=Asks(simulation=False))
     >>> print("\n".join(summary_lines(cert, "foes")))
+    verdict    certified; checked without a solver
     graph      foes: 2 nodes, 2 edges (2 negative), strongly connected
     read       row a,b: information flows a -> b; undirected
     protocol   nominal: T=1, rho1=1, rho2=2, kappa=1; x(0) given
@@ -92,15 +93,14 @@ def summary_lines(
     x(T)       a=-1, b=1 (exact)
     error      at 0.99 T: ||E|| <= 1.4e-09 ||E(0)||, every agent within 5.6e-09
     input      bounded; |u_k| <= 24.01, the largest of agent a
-    verdict    certified; checked without a solver
     >>> unsure = Family.from_intervals([("a", "b", "0.9", "1.1")], undirected=True)
     >>> print("\n".join(summary_lines(certify(unsure, NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)), "pair")))
+    verdict    certified; checked without a solver
     family     pair: 2 nodes, 2 edges, 2 uncertain
     protocol   nominal: T=1, rho1=1, rho2=2, kappa=1; no x(0)
     claim      consensus at T = 1 for every signal
     rate       3.59999, upper bound 3.6: both proved, ratio 0.999999
     input      bounded for every signal and every initial state
-    verdict    certified; checked without a solver
     """
     from ptcc_certify.report.facts.of_certificate import facts_of  # ``classify`` has no use for solvers
 
