@@ -112,6 +112,7 @@ _EXPORTS = {
     "plot_input": "report.plots.input",
     "plot_effort": "report.plots.input",
     "plot_graph": "report.plots.graph",
+    "plot_influence": "report.plots.influence",
     "plot_spectrum": "report.plots.spectrum",
     "plot_frontier": "report.plots.spectrum",
     "plot_tracking": "report.plots.tracking",

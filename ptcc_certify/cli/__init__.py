@@ -26,6 +26,7 @@ from ptcc_certify.cli import (
     design,
     examples_and_cite,
     explore,
+    influence,
     new,
     plot,
     simulate,
@@ -51,6 +52,7 @@ GROUPS: dict[str, dict[click.Command, str]] = {
     "Ask about a graph": {
         classify.classify: "Tell its structure and the theorem that applies.",
         certify.certify: "Prove what the protocol does on it; write a certificate.",
+        influence.influence: "Tell who decides where everybody ends.",
         simulate.simulate: "Run the protocol: a table, or a figure of the states.",
         design.design: "Find gains and a deadline that keep the input within limits.",
         batch.batch: "Certify many graphs: one table.",

@@ -16,7 +16,9 @@ the certificate forms them exactly.
 
 from __future__ import annotations
 
+import csv
 import heapq
+import io
 import math
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -217,6 +219,48 @@ class Influence:
             for leader, weight in self.row(node).items():
                 table[node, place[leader]] = float(weight)
         return pandas.DataFrame(table, index=names[0], columns=names[1])
+
+    @cached_property
+    def shares(self) -> np.ndarray:
+        """The share of each of N nodes in where all end, ``sum_k |Q_kj| / sum_kl |Q_kl|``; all 0 if all end at 0.
+
+        Raises
+        ------
+        ParameterError
+            There are too many followers and leader groups for the weights of all.
+
+        Examples
+        --------
+        >>> influence([("a", "c", 1), ("b", "c", -3)]).shares.round(3)
+        array([0.417, 0.   , 0.583])
+        """
+        if self.containment_weights is None:
+            raise ParameterError("there are too many followers and leader groups to tell every weight; ask row of one")
+        shares, of_followers = np.zeros(self.structure.graph.n_nodes), np.zeros(len(self.balanced))
+        for weights in self.containment_weights:
+            of_followers += [abs(float(weight)) for weight in weights]
+        for (component, null_vector), heard in zip(self.groups, of_followers, strict=True):
+            sizes = np.array([abs(float(w)) for w in null_vector])
+            shares[list(component.nodes)] = sizes * (len(component.nodes) + heard)
+        total = float(shares.sum())
+        return shares / total if total else shares
+
+    def to_csv(self) -> str:
+        """Return the weights that are not 0 as CSV ``node,leader,weight``, as exact as they are known.
+
+        Examples
+        --------
+        >>> print(influence([("a", "c", 1), ("b", "c", -3)]).to_csv(), end="")
+        node,leader,weight
+        a,a,1
+        c,a,1/4
+        c,b,-3/4
+        b,b,1
+        """
+        labels, text = self.structure.graph.labels, io.StringIO()
+        rows = ((label, labels[j], weight) for k, label in enumerate(labels) for j, weight in self.row(k).items())
+        csv.writer(text, lineterminator="\n").writerows([("node", "leader", "weight"), *rows])
+        return text.getvalue()
 
     @property
     def _counted(self) -> list[int]:

@@ -1,0 +1,69 @@
+"""Who decides whom: shares, sums and the heat map agree with where agents end."""
+
+from __future__ import annotations
+
+import csv
+import json
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bad_inputs import ptcc as command
+from generators import made_graphs
+from hypothesis import given
+
+import ptcc_certify as ptcc
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.report.facts.influence import influence_facts
+from ptcc_certify.report.plots.influence import plot_influence
+
+TEAM = [("ann", "bob", 1), ("bob", "ann", 1), ("bob", "eve", -2), ("eve", "dan", 1), ("dan", "eve", 1)]
+
+
+@pytest.mark.few(3)
+@given(made_graphs(max_nodes=7))
+def test_rows_of_the_table_times_initial_states_are_final_states(made):
+    """Two routes to the same numbers: the table as text, and the final state that certificates tell."""
+    who = ptcc.influence(made.graph)
+    x0 = {label: Fraction(3 * k * k - 7, k + 2) for k, label in enumerate(made.graph.labels)}
+    ends = dict.fromkeys(made.graph.labels, Fraction(0))
+    for row in csv.DictReader(who.to_csv().splitlines()):
+        ends[row["node"]] += Fraction(row["weight"]) * x0[row["leader"]]
+    final = ptcc.final_state(made.graph, list(x0.values()))
+    assert ends == dict(zip(final.labels, final.states, strict=True))
+    table = np.zeros((len(x0), len(x0)))
+    for k in range(len(x0)):
+        for j, weight in who.row(k).items():
+            table[k, j] = abs(float(weight))
+    total = table.sum()
+    assert np.allclose(who.shares, table.sum(axis=0) / (total or 1), rtol=1e-12, atol=0)
+
+
+def test_shares_and_sums_are_told():
+    decides, ends = influence_facts(ptcc.influence(TEAM))
+    assert decides.text == "ann 50 %, bob 50 %"
+    assert ends.text == "ann, bob end at 0.5 x_ann + 0.5 x_bob, eve, dan at -0.5 x_ann - 0.5 x_bob"
+    (nobody,) = influence_facts(ptcc.influence("fig1a"))
+    assert nobody.text.startswith("nobody")
+
+
+def test_the_heat_map_has_the_weights_of_all():
+    ax = plot_influence("fig5a")
+    written = [float(text.get_text()) for text in ax.texts]
+    who = ptcc.influence("fig5a")
+    expected = [float(w) for k in range(16) for w in who.row(k).values()]
+    assert np.allclose(sorted(written), sorted(expected), atol=0.005)
+    with pytest.raises(ParameterError, match="all end at 0"):
+        plot_influence("fig1a")
+
+
+def test_the_command_prints_writes_and_draws(tmp_path: Path):
+    run = command("influence", "fig3a", "-o", str(tmp_path / "q.csv"))
+    assert run.code == 0 and "decides    2 38 %, 3 38 %, 1 25 %" in run.out
+    assert (tmp_path / "q.csv").read_text(encoding="utf-8").startswith("node,leader,weight\n1,1,1/4\n")
+    assert command("influence", "fig3a", "-o", str(tmp_path / "q.svg")).code == 0
+    told = json.loads(command("influence", "fig3a", "--json").out)
+    assert told["weights"]["6"] == {"1": "-1/8", "2": "-3/16", "3": "3/16"} and told["exact"]
+    refused = command("influence", "fig3a", "-o", str(tmp_path / "q.txt"))
+    assert refused.code == 2 and refused.err.count("\n") == 1 and not (tmp_path / "q.txt").exists()
