@@ -502,6 +502,62 @@ class SignedDigraph(ReadOnly, Shown):
             self.read,
         )
 
+    def without_nodes(self, *nodes: int | str) -> SignedDigraph:
+        """Return the graph that is left when nodes and their edges are taken out.
+
+        Parameters
+        ----------
+        *nodes : int or str
+            Indices, or labels if these are texts.
+
+        Raises
+        ------
+        UnknownAgentError, GraphError
+            There is no such node; or none is left.
+
+        Examples
+        --------
+        >>> graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -2)])
+        >>> graph.without_nodes("a").edges
+        (('b', 'c', Fraction(-2, 1)),)
+        """
+        out = {place_of(node, self.labels) for node in nodes}
+        left = [k for k in range(self.n_nodes) if k not in out]
+        if not left:
+            raise GraphError("without these nodes there is no graph; leave one of them in")
+        return self.subgraph(left)
+
+    def without_edges(self, *edges: tuple[int | str, int | str]) -> SignedDigraph:
+        """Return the graph without some edges, all its nodes kept, such as to ask who leads when a link is lost.
+
+        Parameters
+        ----------
+        *edges : pair of int or str
+            Source and target, as information flows.
+
+        Raises
+        ------
+        UnknownAgentError, GraphError
+            There is no such node, or edge.
+
+        Examples
+        --------
+        >>> graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("b", "c", -2)])
+        >>> left = graph.without_edges(("a", "b"))
+        >>> left.n_nodes, left.edges
+        (3, (('b', 'a', Fraction(1, 1)), ('b', 'c', Fraction(-2, 1))))
+        """
+        out = set()
+        for edge in edges:
+            if isinstance(edge, str) or len(edge) != 2:
+                raise GraphError(f"{shorten(repr(edge))} is no edge; give pairs (source, target)")
+            out.add(tuple(place_of(node, self.labels) for node in edge))
+        pairs = list(zip(self.source.tolist(), self.target.tolist(), strict=True))
+        for a, b in out.difference(pairs):
+            raise GraphError(f"there is no edge {shorten(self.labels[a])} -> {shorten(self.labels[b])}")
+        keep = np.array([k for k, pair in enumerate(pairs) if pair not in out], dtype=np.int64)
+        return SignedDigraph(self.labels, self.source[keep], self.target[keep], self._weights.take(keep), self.read)
+
     @cached_property
     def sha256(self) -> str:
         r"""SHA-256 of the canonical edge list, independent of the order of nodes and edges.

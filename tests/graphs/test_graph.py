@@ -249,6 +249,34 @@ def test_a_subgraph_is_induced(made, data):
     assert {(s, t): w for s, t, w in part.edges} == {p: w for p, w in weights.items() if inside.issuperset(p)}
 
 
+@given(edge_lists(), st.data())
+def test_without_some_nodes_and_edges_the_others_are_left(made, data):
+    names, weights = made
+    graph = build(names, weights)
+    out = data.draw(st.lists(st.sampled_from(graph.labels), max_size=graph.n_nodes - 1, unique=True))
+    left = graph.without_nodes(*out)
+    assert left.labels == tuple(label for label in graph.labels if label not in out)
+    assert {(s, t): w for s, t, w in left.edges} == {p: w for p, w in weights.items() if not set(p) & set(out)}
+    pairs = data.draw(st.lists(st.sampled_from(sorted(weights)), unique=True)) if weights else []
+    left = graph.without_edges(*pairs)
+    assert left.labels == graph.labels
+    assert {(s, t): w for s, t, w in left.edges} == {p: w for p, w in weights.items() if p not in pairs}
+
+
+@pytest.mark.parametrize(
+    ("call", "why"),
+    [
+        (lambda graph: graph.without_nodes("a", "b"), "there is no graph"),
+        (lambda graph: graph.without_nodes("z"), "z"),
+        (lambda graph: graph.without_edges(("b", "a")), "there is no edge b -> a"),
+        (lambda graph: graph.without_edges("ab"), "give pairs"),
+    ],
+)
+def test_what_is_not_there_cannot_be_taken_out(call, why):
+    with pytest.raises(PTCCError, match=why):
+        call(SignedDigraph.from_edges([("a", "b", 1)]))
+
+
 # ---------------------------------------------------------------------------------------------- orientation
 
 

@@ -57,7 +57,8 @@ def as_graph(graph: Any, orientation: str | None = None, **reading: Any) -> Sign
         Edges flow by default, for a matrix it must be said.
     **reading : Any
         The other keywords of :func:`~ptcc_certify.graphs.io.read_graph` but ``format``, such as ``laplacian=True`` or
-        ``columns="a,b,w"``, as far as they say something about what is given.
+        ``columns="a,b,w"``, as far as they say something about what is given. Of a table ``source=``, ``target=`` and
+        ``weight=`` name the columns as networkx calls them; those left out have these names.
 
     Returns
     -------
@@ -76,6 +77,10 @@ def as_graph(graph: Any, orientation: str | None = None, **reading: Any) -> Sign
     False
     >>> as_graph([("1", "2", -2)]) == as_graph(np.array([[0, -2], [0, 0]]), "information")
     True
+    >>> import pandas
+    >>> table = pandas.DataFrame({"from": ["ann"], "to": ["bob"], "score": [-2]})
+    >>> as_graph(table, source="from", target="to", weight="score").edges
+    (('ann', 'bob', Fraction(-2, 1)),)
     """
     if isinstance(
         signed := graph if isinstance(graph, SignedDigraph) else getattr(graph, "graph", None), SignedDigraph
@@ -88,6 +93,10 @@ def as_graph(graph: Any, orientation: str | None = None, **reading: Any) -> Sign
         raise GraphError(
             f"{graph!r} is several graphs, and one is asked for; certify, decide and simulate take families"
         )
+    if reading.keys() & set(_COLUMNS):
+        if "columns" in reading:
+            raise ParameterError("columns are named twice; give columns=, or source=, target= and weight=")
+        reading["columns"] = [str(reading.pop(name, name)) for name in _COLUMNS]
     how = Reading(orientation=orientation, **reading)
     if isinstance(graph, str) and not os.path.exists(graph) and graph not in GRAPHS and "." not in graph:  # noqa: PTH110
         names = f"({', '.join(GRAPHS)}); check the path{did_you_mean(graph, GRAPHS)}"
@@ -116,6 +125,8 @@ def as_graph(graph: Any, orientation: str | None = None, **reading: Any) -> Sign
     return SignedDigraph.from_edges(rows, orientation=way, **_only(how, reading, _OF_EDGES))
 
 
+#: The columns of a table of edges, as networkx calls them.
+_COLUMNS = ("source", "target", "weight")
 #: What may be said of edges, and of a matrix, that are in memory.
 _OF_EDGES = ("duplicates", "drop_self_loops", "drop_zeros", "undirected")
 _OF_MATRICES = ("duplicates", "drop_self_loops", "undirected", "laplacian")
