@@ -103,7 +103,7 @@ def test_a_bound_that_is_certified_and_says_nothing_is_not_called_certified_alon
     assert slow.verdict == "certified" and slow.envelope.residual(1e-9) > 0.9
     assert slow.assessment.text.startswith("certified, but with these gains the bound says little by T: ||E|| <= ")
     assert slow.assessment.exit_code == 0 and slow.to_dict()["verdict"] == "certified"
-    assert "says little" in certificate_lines(slow, "fig5b")[-1]
+    assert "says little" in certificate_lines(slow, "fig5b")[0]
 
 
 def test_what_is_useful_is_stated_and_true():
@@ -215,7 +215,7 @@ def test_codes_are_worst_first():
 )
 def test_an_expectation_that_is_not_met_is_in_the_verdict_line(options: tuple[str, ...], code: int, says: str):
     run = detailed("certify", "fig1a", "--no-simulation", *options)
-    assert run.code == code and run.out.splitlines()[-1].startswith(f"verdict    {says}"), run.out
+    assert run.code == code and run.out.splitlines()[0].startswith(f"verdict    {says}"), run.out
     assert run.err == ""
     told = ptcc("certify", "fig1a", "--no-simulation", "--json", *options)
     assert told.code == code and (f"verdict    {says}" in told.err) == bool(code)
@@ -280,7 +280,7 @@ def test_what_a_file_says_was_asked_need_not_be_sound(asked: Any, tmp_path: Path
 
 def test_lines_are_short():
     assert all(len(weak(k, k % 3 == 0).assessment.text) <= 200 for k in range(1, 10, 2))
-    assert len(certificate_lines(strong(), "fig1a")[-1]) <= 80
+    assert len(certificate_lines(strong(), "fig1a")[0]) <= 80
 
 
 # ---------------------------------------------------------------------- what is left under limits of the gain

@@ -171,7 +171,7 @@ def test_proved_is_0():
     run = detailed("certify", "fig1b", "--x0", X0)
     assert run.code == 0
     says = r"verdict    certified; \|\|E\|\| <= [0-9.e-]+ \|\|E\(0\)\|\| at 0.99 T"
-    assert re.fullmatch(says, run.out.splitlines()[-1])
+    assert re.fullmatch(says, run.out.splitlines()[0])
     assert run.err == ""
 
 
@@ -181,7 +181,7 @@ def test_a_violated_bound_is_1(monkeypatch: pytest.MonkeyPatch):
     run = detailed("certify", "fig1b", "--expect", "stability")
     assert run.code == 1
     says = "VIOLATED: the simulated run exceeds the proved bound; please report this graph; refuted: stability"
-    assert run.out.splitlines()[-1].startswith(f"verdict    {says}")
+    assert run.out.splitlines()[0].startswith(f"verdict    {says}")
     assert ptcc("examples", "fig1a").code == 1
 
 
@@ -236,7 +236,7 @@ def test_a_refuted_expectation_is_3(command: str):
     claimed = run.out.split("claim      ")[1].partition(" (")[0].partition(" at T")[0]  # not a weaker one
     said = f"refuted: stability (it is {claimed})"
     if command == "certify":
-        assert run.out.splitlines()[-1] == f"verdict    {said}; the rest is certified" and run.err == ""
+        assert run.out.splitlines()[0] == f"verdict    {said}; the rest is certified" and run.err == ""
     else:
         assert run.err == f"{said}\n" and run.out  # the answer is printed all the same
 
@@ -375,7 +375,7 @@ def test_long_weights_short_of_the_limit_are_certified(folder: Path, digits: int
     Path("g.csv").write_text("\n".join(rows) + "\n")
     start = ",".join(f"{k}.{10**digits + k}" for k in range(6))
     run = ptcc("certify", "g.csv", "--method", "paper", "--no-simulation", "--x0", start, "--T", f"1.{10**digits + 1}")
-    assert run.code == 0 and run.out.splitlines()[-1].startswith("verdict    certified; ")
+    assert run.code == 0 and run.out.splitlines()[0].startswith("verdict    certified; ")
 
 
 def test_parameters_of_thousands_of_digits_are_refused_by_name(folder: Path):
@@ -449,7 +449,7 @@ def test_a_rate_beyond_the_upper_bound_is_3_and_one_below_it_4():
     for wanted, code in ((proved, 0), (proved + hair, 4), (limit, 4), (limit + hair, 3), (mean, 3)):
         run = detailed("certify", "fig1b", *PAPER, "--min-rate", str(wanted))
         assert run.code == code
-        verdict = run.out.splitlines()[-1].removeprefix("verdict    ")
+        verdict = run.out.splitlines()[0].removeprefix("verdict    ")
         assert verdict.startswith({0: "met: rate >= ", 3: "refuted: rate >= ", 4: "left open: rate >= "}[code])
         bound = re.search(r"upper bound ([0-9.]+), proved|at most ([0-9.]+) can be|met: rate", verdict)
         assert bound is not None and (code == 0 or Fraction(bound[1] or bound[2]) >= limit)
@@ -826,7 +826,7 @@ def test_simulate_writes_tables(name: str):
 )
 def test_max_input_is_met_refuted_or_undecided(most: str, code: int, says: str):
     run = detailed("certify", "fig1a", "--method", "paper", "--no-simulation", "--max-input", most)
-    assert run.code == code and says in run.out.splitlines()[-1]
+    assert run.code == code and says in run.out.splitlines()[0]
 
 
 @pytest.mark.few(1)
@@ -856,7 +856,7 @@ def test_max_input_is_judged_under_the_noise_and_the_disturbances_of_the_command
 ):
     (folder / "g.csv").write_text("a,b,1\nb,a,-1\nb,c,2\n")
     run = detailed("certify", "g.csv", "--x0", "1,2,3", "--no-simulation", *given, "--max-input", most)
-    assert run.code == code and (says or "met: |u_k|") in run.out.splitlines()[-1], (run.code, run.out)
+    assert run.code == code and (says or "met: |u_k|") in run.out.splitlines()[0], (run.code, run.out)
 
 
 def test_max_input_under_a_limit_is_about_what_the_limit_leaves(folder: Path):
@@ -877,7 +877,7 @@ def test_an_input_without_bound_is_said_prominently_and_refutes_every_limit():
     run = detailed(*words)
     assert run.code == 0 and "INPUT      NOT BOUNDED" in run.out and "raise rho2 kappa to 0.38337" in run.out
     refuted = detailed(*words, "--initial-bound", "1", "--max-input", "1e9")
-    assert refuted.code == 3 and "without limit, proved" in refuted.out.splitlines()[-1]
+    assert refuted.code == 3 and "without limit, proved" in refuted.out.splitlines()[0]
 
 
 @pytest.mark.few(0)
