@@ -100,7 +100,10 @@ def test_a_certificate_tells_what_its_graph_is_called_and_where_its_initial_stat
     cert = ptcc.certify("fig1b", PROTOCOL, "random", asks=fast)
     for one in (cert, ptcc.read_certificate(cert)):
         assert one.request.origins == {"graph": "fig1b", "x(0)": "random, seed 0"}
-        assert one.summary().startswith("graph      fig1b: 6 nodes") and "; x(0) random, seed 0" in one.summary()
+        assert (
+            one.summary().splitlines()[1].startswith("graph      fig1b: 6 nodes")
+            and "; x(0) random, seed 0" in one.summary()
+        )
     named = certify_case(Case(TEAM, PROTOCOL, [5, 2, -4], asks=fast), origins={"graph": "team"})
     assert "team: 3 nodes" in named.summary() and "x(0) given" in named.summary()
     assert named == ptcc.certify(TEAM, PROTOCOL, [5, 2, -4], asks=fast)

@@ -34,7 +34,7 @@ def test_every_run_is_drawn_inside_its_tube(name: str) -> None:
     room = 1e-6 * np.ptp(ax.get_ylim())
     for k, tube in enumerate(ax.collections):
         (path,) = tube.get_paths()
-        t, x = lines[node_id(k)].get_data()
+        t, x = lines[node_id(k, "run")].get_data()
         half = (len(path.vertices) - 3) // 2
         rims = path.vertices[1 : half + 1], path.vertices[half + 2 : -1][::-1]
         low, high = (np.interp(t, rim[:, 0], rim[:, 1]) for rim in rims)

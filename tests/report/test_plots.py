@@ -862,12 +862,15 @@ def test_every_figure_names_the_unit_of_time() -> None:
 
 def test_every_figure_has_one_signature() -> None:
     names = [name for name in ptcc_certify.__all__ if name.startswith("plot_")]
-    assert len(names) == 13
+    assert len(names) == 15
     for name in names:
         subject, *keywords = inspect.signature(getattr(ptcc_certify, name)).parameters.values()
         assert subject.name == "subject" and subject.default is inspect.Parameter.empty
         assert all(one.kind is inspect.Parameter.KEYWORD_ONLY for one in keywords)
-        assert name in ("plot_run", "plot_motion") or (keywords[0].name, keywords[0].default) == ("ax", None)
+        assert name in ("plot_run", "plot_motion", "plot_glance") or (keywords[0].name, keywords[0].default) == (
+            "ax",
+            None,
+        )
 
 
 def test_a_subject_that_leads_to_no_figure_is_refused_with_the_mend() -> None:

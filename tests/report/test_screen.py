@@ -39,7 +39,7 @@ STRONG = ptcc.NominalProtocol(T=1, rho1=1, rho2=2, kappa=2)
 SLIDING = ptcc.SlidingModeProtocol(T_r="0.5", T_s=1, rho1="0.1", rho2="0.3", kappa=2, mu1="1.2", mu2=1, mu3=1, delta=1)
 PAIR = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
 LABELS = (str, lambda k: f"agent number {k} of a rather long list of agents", lambda k: f"日本語の節点{k}" * 5)
-HEADS = ["graph", "read", "protocol", "claim", "x(T)", "error", "input", "verdict"]
+HEADS = ["verdict", "graph", "read", "protocol", "claim", "x(T)", "error", "input"]
 #: The beginning of the verdict line by exit code.
 VERDICTS = {
     ExitCode.OK: "(met: .*)?certified",
@@ -158,7 +158,7 @@ def test_what_disturbances_add_has_a_line_and_the_verdict_is_of_none():
         (line,) = [line for line in lines if line.startswith("disturbed  |d_k| <= 1 adds at most ")]
         assert ("x_k(T)" in line) == (not limits), "where they move the agents is proved without limits alone"
         assert ("; of x(T) nothing is proved" in " ".join(map(str.strip, lines))) == bool(limits)
-        assert lines[-1].startswith("verdict    certified without disturbances")
+        assert lines[0].startswith("verdict    certified without disturbances")
 
 
 def test_noise_that_is_left_open_has_its_reason():
@@ -213,7 +213,7 @@ def test_the_claim_says_that_it_is_without_limits_of_the_gain():
 def test_agents_that_end_at_the_same_state_are_told_together_where_one_line_is_enough():
     graph, x0 = load_graph("fig1b"), ["7.013", "2.739", "0.223", "-4.604", "-3.844", "-9.181"]
     lines = assert_screen(ptcc.certify(graph, NOMINAL, x0, asks=ptcc.Asks(simulation=False)))
-    assert len(lines) == 8 and lines[4] == "x(T)       1, 2, 5, 6 at 1.3001; 3, 4 at -1.3001 (rounded)"
+    assert len(lines) == 8 and lines[5] == "x(T)       1, 2, 5, 6 at 1.3001; 3, 4 at -1.3001 (rounded)"
 
 
 def test_a_long_label_keeps_the_end_that_tells_it_apart():

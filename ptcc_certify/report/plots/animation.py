@@ -117,11 +117,11 @@ class _Scene:
         """Return the picture of the instant ``t``, (height, width, 4)."""
         shown = self.run.t <= t
         for k, way in enumerate(self.ways):
-            name, now = node_id(k), np.array([np.interp(t, self.run.t, own) for own in way])
+            name, node, now = node_id(k, "run"), node_id(k), np.array([np.interp(t, self.run.t, own) for own in way])
             self.lines[name].set_data(*np.column_stack([way[:, shown], now]))
             self.dots[name].set_data(*now[:, None])
-            if name in self.nodes and not self.in_plane:
-                self.nodes[name].set_color(colours_of(now[1:], self.scale)[0])
+            if node in self.nodes and not self.in_plane:
+                self.nodes[node].set_color(colours_of(now[1:], self.scale)[0])
         self.time.set_text(f"$t$ = {min(t, self.T):.3g} of {near(self.run.protocol.gain.T)}")
         self.canvas.restore_region(self.still)
         for artist in self.moving:

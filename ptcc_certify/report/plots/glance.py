@@ -256,7 +256,7 @@ def _draw_run(ax: Axes, certificate: Certificate, run: Any, ends: np.ndarray, ti
         tubes = _tubes(certificate, run) if isinstance(run, Trajectory) else None
         for k, colour in enumerate(colours):
             width = 1.3 if len(values) <= _NAMED else 0.8
-            ax.plot(run.t, values[k], color=colour, linewidth=width, gid=node_id(k))
+            ax.plot(run.t, values[k], color=colour, linewidth=width, gid=node_id(k, "run"))
             if tubes is not None:
                 low, high = tubes
                 ax.fill_between(run.t, low[k], high[k], color=colour, alpha=_SHADE / max(5, len(values)), linewidth=0)

@@ -322,16 +322,16 @@ def _draw_arrows(
         ax.plot([], [], color="black", linestyle=":", linewidth=1.1, label="may fail")
 
 
-def node_id(k: int) -> str:
-    """Return what the mark of an agent, and its line, are known by in a figure.
+def node_id(k: int, of: str = "node") -> str:
+    """Return what the mark of an agent is known by in a figure, or its ``run``.
 
     Examples
     --------
     >>> from ptcc_certify.report.plots.graph import node_id
-    >>> node_id(3)
-    'agent-3'
+    >>> node_id(3), node_id(3, "run")
+    ('node-3', 'run-3')
     """
-    return f"agent-{k}"
+    return f"{of}-{k}"
 
 
 def fit_height(ax: Axes, boxes: np.ndarray, radius: float) -> None:

@@ -176,7 +176,7 @@ def plot_formation(subject: Any, *, ax: Axes | None = None) -> Axes:
     width = 1.0
     for k, style in camp_lines(groups, range(len(groups))):
         (x, y), color = run.positions[k], style["color"]
-        ax.plot(x, y, linewidth=width, gid=node_id(k), **style)
+        ax.plot(x, y, linewidth=width, gid=node_id(k, "run"), **style)
         ax.plot(x[0], y[0], "o", markersize=3.5, markerfacecolor="white", markeredgecolor=color, zorder=4)
         ax.plot(x[-1], y[-1], "o", markersize=4.5, color=color, zorder=5)
     ax.set_aspect("equal", adjustable="datalim")
