@@ -21,9 +21,9 @@ The names at the top, by topic:
 - Bounds and design: ``final_state``, ``influence``, ``formation_of_biases``, ``box``, ``ellipsoid``,
   ``worst_initial_state``, ``design``, ``design_agents``
 - Many graphs: ``Ensemble``, ``certify_many``
-- Figures: ``plot_glance``, ``animate``, ``plot_influence``, ``plot_trajectory``, ``plot_decay``, ``plot_run``, ``plot_sliding``, ``plot_trade_off``, ``plot_input``,
-  ``plot_effort``, ``plot_graph``, ``plot_spectrum``, ``plot_frontier``,
-  ``plot_motion``, ``plot_formation``, ``plot_tracking``, ``save_figure``, ``SINGLE_COLUMN``,
+- Figures: ``plot_glance``, ``animate``, ``plot_influence``, ``plot_trajectory``, ``plot_decay``, ``plot_run``,
+  ``plot_sliding``, ``plot_trade_off``, ``plot_input``, ``plot_effort``, ``plot_graph``, ``plot_spectrum``,
+  ``plot_frontier``, ``plot_motion``, ``plot_formation``, ``plot_tracking``, ``save_figure``, ``SINGLE_COLUMN``,
   ``DOUBLE_COLUMN``
 - Reports: ``write_report``, ``explore``, ``cite``
 - Errors: ``PTCCError``

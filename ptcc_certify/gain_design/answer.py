@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
@@ -18,8 +19,10 @@ from ptcc_certify.certificate.assessment import CERTIFIED
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.fact import Fact, Facts
 from ptcc_certify.checker.input_formulas import Limits
+from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.gain_design.request import DesignRequest, Request, fit_of
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, short_exact
+from ptcc_certify.graphs.size_limits import TRACED_NODES
 from ptcc_certify.lazy_report import Shown, rendered
 from ptcc_certify.model import Protocol
 from ptcc_certify.model.agents import Agents
@@ -368,8 +371,7 @@ class Design(DesignAnswer):
         """Return what is told of it, the largest input that was found last."""
         yield from super().facts()
         if self.worst is not None and self.protocol is not None:
-            text = f"the largest input found is {self.worst.size:.4g}, at t = {self.worst.t:.4g}"
-            yield Fact(head="numerical", value=self.worst.size, standing="observed", note=text, detail=True)
+            yield _seen(self.worst.size, self.size, f", at t = {self.worst.t:.4g}, of all initial states", self.peak)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the design as JSON-ready data, exact numbers as texts, without the certificate."""
@@ -382,6 +384,14 @@ class Design(DesignAnswer):
         p, cap = self.protocol, "" if self.gain_cap is None else f", gain_cap={short_exact(self.gain_cap)}"
         gains = f"T={short_exact(p.T)}, rho1={short_exact(p.rho1)}, rho2={short_exact(p.rho2)}{cap}"
         return f"Design({self.verdict}, {gains}, peak {up(self.peak)})"
+
+
+def _seen(seen: float, name: str, where: str, peak: Fraction | None) -> Fact:
+    """Tell the largest input that was seen, and how far the proved peak is above it."""
+    times = f"; proved {float(peak) / seen:.2g} times that" if peak and seen else ""
+    return Fact(
+        head="simulated", value=seen, standing="observed", note=f"{name} up to {seen:.4g}{where} (numerical){times}"
+    )
 
 
 @dataclass(frozen=True, repr=False)
@@ -446,6 +456,15 @@ class AgentsDesign(DesignAnswer):
         if self.certificate is None or self.certificate.proof.agents is None:
             return ""
         return f"{super().gains_text}; {self.certificate.proof.agents.gains_text}"
+
+    def facts(self) -> Facts:
+        """Return what is told of it, the largest input of a run last."""
+        yield from super().facts()
+        part = None if self.certificate is None else self.certificate.proof.agents
+        if part is not None and part.initial_state is not None and len(part.initial_state) <= TRACED_NODES:
+            with suppress(SimulationError, ParameterError):
+                size = float(np.nanmax(np.linalg.norm(part.simulate().input, axis=1)))
+                yield _seen(size, self.size, "", self.peak)
 
     @property
     def deadline_text(self) -> str:
