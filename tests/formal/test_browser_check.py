@@ -1,0 +1,138 @@
+"""The proved checker in a browser: it answers to the letter as the executable does, of forgeries too."""
+
+from __future__ import annotations
+
+import json
+import random
+import subprocess
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mutations import mutants, resealed
+from verified import program
+
+FORMAL = Path(__file__).resolve().parents[2] / "formal"
+PAGE = FORMAL / "browser" / "check.html"
+CORPUS = FORMAL.parent / "tests" / "corpus"
+#: Exit codes, by the class of the answer.
+CODES = {"certified": 0, "rejected": 1, "unreadable": 2, "undecided": 4}
+
+
+@pytest.fixture(scope="module")
+def page(browser: Any) -> Any:
+    if not PAGE.exists():
+        pytest.skip("the page is not built: make -C formal browser/check.html")
+    shown = browser.new_page()
+    shown.goto(PAGE.as_uri())
+    yield shown
+    shown.close()
+
+
+def answered(page: Any, file: Path) -> tuple[int, str]:
+    """Return the exit code that the page's answer stands for, and the lines that it shows."""
+    page.evaluate("document.getElementById('answer').className = 'before'")
+    page.set_input_files("#files", str(file))
+    page.wait_for_function(f"{list(CODES)}.includes(document.getElementById('answer').className)", timeout=60_000)
+    kind = page.get_attribute("#answer", "class")
+    shown = page.locator("#answer > pre")
+    return CODES[kind], shown.text_content() if shown.count() else ""
+
+
+def told(file: Path) -> tuple[int, str]:
+    """Return what the executable says, without the obligations that it verified."""
+    run = subprocess.run([program(), "--obligations", file], capture_output=True, text=True, check=False)
+    lines = (run.stdout + run.stderr).rstrip().split("\n")
+    return run.returncode, "\n".join(line for line in lines if not line.startswith("verified "))
+
+
+@pytest.mark.browser
+def test_stored_certificates_are_answered_as_by_the_executable(page: Any) -> None:
+    files = sorted(CORPUS.glob("*.json"))
+    assert len(files) > 60
+    codes = set()
+    for file in files[::4]:
+        assert answered(page, file) == told(file), file.name
+        codes.add(told(file)[0])
+    assert {0, 2, 4} <= codes
+
+
+@pytest.mark.browser
+def test_forgeries_are_rejected_as_by_the_executable(page: Any, tmp_path: Path) -> None:
+    rejected = 0
+    for name in ("fig3a", "fig5a", "windows", "agents-sliding"):
+        data = json.loads((CORPUS / f"{name}.json").read_text(encoding="utf-8"))
+        every = [forged for _, forged in islice(mutants(data, 37), 400)]
+        for number, forged in enumerate(random.Random(name).sample(every, 6)):
+            file = tmp_path / f"{name}-{number}.json"
+            file.write_text(json.dumps(resealed(forged)))
+            code, text = answered(page, file)
+            if not (code == 2 and "more room than this browser gives" in text):  # a browser has less of a stack
+                assert (code, text) == told(file)
+            rejected += code in (1, 2)
+    assert rejected >= 15
+
+
+@pytest.mark.browser
+def test_what_is_no_certificate_is_told(page: Any, tmp_path: Path) -> None:
+    for text in ("", "{", "[1]", '{"schema": "other"}', "\x00" * 100):
+        file = tmp_path / "c.json"
+        file.write_text(text)
+        assert answered(page, file)[0] == 2
+
+
+def test_integers_of_the_browser_are_what_they_should_be(tmp_path: Path) -> None:
+    """Every primitive in Node.js on small, large and border numbers, against Python's integers."""
+    node = subprocess.run(["node", "--version"], capture_output=True, check=False) if _has_node() else None
+    if node is None or node.returncode:
+        pytest.skip("no Node.js")
+    source = (FORMAL / "browser" / "zarith.js").read_text(encoding="utf-8")
+    rng = random.Random(1)
+    numbers = [0, 1, -1, 2, 7, -12, 2**31 - 1, -(2**31), 2**31, -(2**31) - 1, 10**30 + 7, -(3**80)]
+    numbers += [rng.randrange(-(2**bits), 2**bits) for bits in (8, 33, 64, 200) for _ in range(3)]
+    pairs = [(x, y) for x in numbers for y in numbers]
+    program_text = f"""
+const raised = () => {{ throw new Error("raised"); }};
+const caml_raise_zero_divide = raised, caml_invalid_argument = raised, caml_custom_ops = {{}};
+{source}
+const normal = (x) => ml_z_normal(BigInt(x)), told = [];
+const fine = (z) => {{
+  if ((typeof z === "number") !== (z >= -2147483648 && z <= 2147483647)) throw new Error("not normal: " + z);
+  return String(z);
+}};
+for (const [p, q] of {json.dumps([[str(x), str(y)] for x, y in pairs])}) {{
+  const x = normal(p), y = normal(q), row = [ml_z_add, ml_z_sub, ml_z_mul, ml_z_gcd].map((f) => fine(f(x, y)));
+  row.push(...[ml_z_neg, ml_z_abs, ml_z_succ, ml_z_pred].map((f) => fine(f(x))));
+  row.push(...[ml_z_compare(x, y), ml_z_equal(x, y), ml_z_sign(x), ml_z_numbits(x)].map(String));
+  if (y != 0) row.push(...[ml_z_div, ml_z_rem, ml_z_fdiv, ml_z_cdiv].map((f) => fine(f(x, y))));
+  if (x >= 0) row.push(fine(ml_z_sqrt(x)));
+  row.push(fine(ml_z_pow(x, 5)), fine(ml_z_shift_left(x, 40)));
+  told.push(row);
+}}
+console.log(JSON.stringify(told));
+"""
+    file = tmp_path / "try.js"
+    file.write_text(program_text, encoding="utf-8")
+    run = subprocess.run(["node", file], capture_output=True, text=True, check=True)
+    for (x, y), row in zip(pairs, json.loads(run.stdout), strict=True):
+        assert row == [str(number) for number in _expected(x, y)], (x, y)
+
+
+def _has_node() -> bool:
+    from shutil import which
+
+    return which("node") is not None
+
+
+def _expected(x: int, y: int) -> list[int]:
+    import math
+
+    values = [x + y, x - y, x * y, math.gcd(x, y), -x, abs(x), x + 1, x - 1]
+    values += [(x > y) - (x < y), int(x == y), (x > 0) - (x < 0), abs(x).bit_length()]
+    if y:
+        towards_0 = abs(x) // abs(y) * (1 if (x < 0) == (y < 0) else -1)
+        values += [towards_0, x - towards_0 * y, x // y, -(-x // y)]
+    if x >= 0:
+        values.append(math.isqrt(x))
+    return [*values, x**5, x << 40]
