@@ -28,7 +28,7 @@ extensions = [
     "sphinx_copybutton",
     "sphinx_design",
 ]
-exclude_patterns = ["_build", "_ext"]
+exclude_patterns = ["_build", "_ext", "paper"]
 
 # -- written anew in every build ---------------------------------------------------------------------------------------
 for notebook in DOCS.glob("tutorial/*.ipynb"):

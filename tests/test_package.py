@@ -1,16 +1,21 @@
 """Facts about the package as a whole: what it exports, and under which names."""
 
 import inspect
+import json
 import pickle
 import pkgutil
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
 
 import ptcc_certify
+
+ROOT = Path(__file__).parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
 
 def test_every_export_is_there_and_stays_what_it_is():
@@ -60,3 +65,40 @@ def test_no_module_bears_the_name_of_an_export():
     modules = {module.name for module in pkgutil.iter_modules(ptcc_certify.__path__)}
     assert {"graphs", "bounds", "simulation"} <= modules
     assert not modules & set(ptcc_certify.__all__)
+
+
+# ---------------------------------------------------------------------- what a release needs
+
+
+@pytest.mark.parametrize(
+    ("file", "where"),
+    [
+        ("CITATION.cff", r"^version: (.+)$"),
+        ("CHANGELOG.md", r"\A# Changelog\n\n## (.+)$"),
+        ("conda/meta.yaml", r'^\{% set version = "(.+)" %\}$'),
+        ("docs/how-to/install.md", r"ptcc_certify-(.+?)-py3-none-any\.whl"),
+    ],
+)
+def test_the_version_is_that_of_pyproject_wherever_it_stands(file: str, where: str):
+    text = (ROOT / file).read_text(encoding="utf-8")
+    assert re.findall(where, text, re.MULTILINE) == [PROJECT["version"]]
+
+
+def test_the_conda_recipe_asks_for_what_pyproject_asks_for():
+    recipe = (ROOT / "conda" / "meta.yaml").read_text(encoding="utf-8")
+    run = re.search(r"^  run:\n((?:    - .+\n)+)", recipe, re.MULTILINE)[1]
+    listed = [line.removeprefix("    - ").replace("matplotlib-base", "matplotlib") for line in run.splitlines()]
+    asked = [f"python {PROJECT['requires-python']}", *(one.replace(">=", " >=") for one in PROJECT["dependencies"])]
+    python_min = re.search(r'python_min = "(.+)"', recipe)[1]
+    assert [line.replace("{{ python_min }}", python_min) for line in listed] == asked
+    assert all(f"{name} = {call}" in recipe for name, call in PROJECT["scripts"].items())
+
+
+def test_an_archive_of_a_release_is_described_as_the_citation_describes_the_program():
+    archive = json.loads((ROOT / ".zenodo.json").read_text(encoding="utf-8"))
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f'title: "{archive["title"]}"' in citation and f"license: {archive['license']}\n" in citation
+    assert re.findall(r"^  - (?!name|type)(.+)$", citation, re.MULTILINE) == archive["keywords"]
+    assert re.findall(r"^  - name: (.+)$", citation, re.MULTILINE) == [one["name"] for one in archive["creators"]]
+    abstract = " ".join(re.search(r"^abstract: >-\n((?:  .+\n)+)", citation, re.MULTILINE)[1].split())
+    assert archive["description"] == f"<p>{abstract}</p>"
