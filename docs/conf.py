@@ -28,7 +28,7 @@ extensions = [
     "sphinx_copybutton",
     "sphinx_design",
 ]
-exclude_patterns = ["_build", "_ext", "paper"]
+exclude_patterns = ["_build", "_ext", "_extra", "paper"]
 
 # -- written anew in every build ---------------------------------------------------------------------------------------
 for notebook in DOCS.glob("tutorial/*.ipynb"):
@@ -58,6 +58,8 @@ html_theme = "furo"
 html_title = "ptcc-certify"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+_checker = DOCS.parent / "formal" / "browser" / "check.html"  # the proved checker, where it was built
+html_extra_path = [str(_checker if _checker.exists() else DOCS / "_extra" / "check.html")]
 html_math_renderer = "svg"
 html_show_sphinx = html_show_copyright = False
 html_copy_source = False
