@@ -27,6 +27,7 @@ extensions = [
     "sphinx.ext.autosummary",
     "sphinx_copybutton",
     "sphinx_design",
+    "thumbnails",
 ]
 exclude_patterns = ["_build", "_ext"]
 
