@@ -11,7 +11,7 @@ from sphinx.util import logging
 from sphinx.util.docutils import SphinxDirective
 
 
-class thumbnails(nodes.Element):
+class Room(nodes.Element):
     """Where the small pictures of a page will stand."""
 
 
@@ -25,7 +25,7 @@ class Thumbnails(SphinxDirective):
         """Leave room for them: figures are known when every page has been read."""
         page = self.env.relfn2path(self.arguments[0])[0].removesuffix(".md")
         self.env.note_dependency(self.env.doc2path(page))
-        room = thumbnails(page=page, figure=self.options.get("figure", 1))
+        room = Room(page=page, figure=self.options.get("figure", 1))
         self.set_source_info(room)
         return [room]
 
@@ -44,7 +44,7 @@ def pictures(document: nodes.document, number: int) -> list[tuple[str, str, node
 
 def show(app: Sphinx, document: nodes.document, page: str) -> None:
     """Put the pictures where they belong."""
-    for room in list(document.findall(thumbnails)):
+    for room in list(document.findall(Room)):
         grid = nodes.container(classes=["thumbnails"])
         address = app.builder.get_relative_uri(page, room["page"])
         for anchor, title, image in pictures(app.env.get_doctree(room["page"]), room["figure"]):
@@ -54,14 +54,14 @@ def show(app: Sphinx, document: nodes.document, page: str) -> None:
             link = nodes.reference("", "", refuri=f"{address}#{anchor}", internal=True)
             link += [image, nodes.inline(text=title)]
             grid += nodes.paragraph("", "", link)
-        if not grid.children and app.config.nb_execution_mode != "off":
+        if not grid.children and getattr(app.config, "nb_execution_mode", "") != "off":
             logging.getLogger(__name__).warning("no figures in the sections of %s", room["page"], location=room)
         room.replace_self(grid)
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Offer the directive ``thumbnails``."""
-    app.add_node(thumbnails)
+    app.add_node(Room)
     app.add_directive("thumbnails", Thumbnails)
     app.connect("doctree-resolved", show)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
