@@ -27,6 +27,7 @@ extensions = [
     "sphinx.ext.autosummary",
     "sphinx_copybutton",
     "sphinx_design",
+    "thumbnails",
 ]
 exclude_patterns = ["_build", "_ext", "_extra", "paper"]
 
@@ -74,6 +75,17 @@ def name_controls(app: Any, page: nodes.document) -> None:
             block.replace_self(nodes.paragraph(text="Here the controls appear when you run the notebook yourself."))
 
 
+def name_figures(app: Any, page: nodes.document) -> None:
+    """Let a figure without words of its own bear the title of its section, for readers without eyes."""
+    for image in page.findall(nodes.image):
+        place: Any = image
+        while place is not None and not isinstance(place, nodes.section):
+            place = place.parent
+        if place is not None and image.get("alt") is None:
+            image["alt"] = place.next_node(nodes.title).astext()
+
+
 def setup(app: Any) -> None:
     """Change pages as they are read."""
     app.connect("doctree-read", name_controls)
+    app.connect("doctree-read", name_figures)

@@ -51,13 +51,17 @@ def check_transcripts(text: str) -> int:
     """Run what is shown after ``$ ptcc``, and compare to the letter; ``...`` stands for lines. Return how many."""
     transcripts = [block for _, block in blocks(text, "console") if block.startswith("$ ptcc ")]
     for block in transcripts:
-        command, shown = block.split("\n", 1)
-        done = ptcc(command.removeprefix("$ "))
-        assert done.code == _exit_code(command), (command, done.err)
-        first, _, last = shown.rpartition("...\n")
-        assert done.out.startswith(first) and done.out.endswith(last), done.out
-        assert first or "..." in shown or done.out == shown
+        _check_transcript(block)
     return len(transcripts)
+
+
+def _check_transcript(block: str) -> None:
+    command, shown = block.split("\n", 1)
+    done = ptcc(command.removeprefix("$ "))
+    assert done.code == _exit_code(command), (command, done.err)
+    first, _, last = shown.rpartition("...\n")
+    assert done.out.startswith(first) and done.out.endswith(last), done.out
+    assert first or "..." in shown or done.out == shown
 
 
 def _exit_code(command: str) -> int:
@@ -66,10 +70,13 @@ def _exit_code(command: str) -> int:
 
 
 def run_page(text: str, folder: Path) -> None:
-    """Run the commands and the Python of a page, in one folder and with one set of names."""
+    """Run the commands, the transcripts and the Python of a page, in one folder and with one set of names."""
     names: dict[str, Any] = {"__name__": "__main__"}
-    for language, block in blocks(text, "sh", "python"):
+    for language, block in blocks(text, "sh", "console", "python"):
         if language == "sh":
             run_commands(block, folder)
+        elif language == "console":
+            if block.startswith("$ ptcc "):
+                _check_transcript(block)
         else:
             exec(compile(block, f"<{block.splitlines()[0]}>", "exec"), names)

@@ -121,11 +121,15 @@ def test_equations_of_docstrings_are_literal(lines: list[str], more: int):
 # ---------------------------------------------------------------------- formulas and links
 
 
-def built(folder: Path, text: str) -> tuple[str, str]:
-    """Build a site of one page with the extensions of the site; return its HTML and the warnings."""
+def built(folder: Path, text: str, *extensions: str) -> tuple[str, str]:
+    """Build a site of one page with extensions of the site; return its HTML and the warnings."""
     (folder / "index.rst").write_text(f"Page\n====\n\n{text}\n", encoding="utf-8")
     warnings = StringIO()
-    settings = {"extensions": ["formulas", "local_links"], "html_math_renderer": "svg", "html_theme": "basic"}
+    settings = {
+        "extensions": ["formulas", "local_links", *extensions],
+        "html_math_renderer": "svg",
+        "html_theme": "basic",
+    }
     app = Sphinx(folder, None, folder / "out", folder / "doctrees", "html", settings, status=None, warning=warnings)
     app.build()
     return (folder / "out" / "index.html").read_text(encoding="utf-8"), warnings.getvalue()
@@ -154,12 +158,46 @@ def test_a_page_with_a_fault_is_told(tmp_path: Path, text: str, warning: str):
     assert warning in built(tmp_path, text)[1]
 
 
+OTHER = ":orphan:\n\nOther\n=====\n\nOne\n---\n\n.. image:: a.svg\n\n.. image:: b.svg\n   :width: 46em\n\nTwo\n---\n"
+
+
+@pytest.mark.few(0)
+def test_small_pictures_lead_to_their_sections(tmp_path: Path):
+    (tmp_path / "other.rst").write_text(OTHER, encoding="utf-8")
+    for name in ("a.svg", "b.svg"):
+        (tmp_path / name).write_text('<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9"/>', "utf-8")
+    page, warnings = built(tmp_path, ".. thumbnails:: other\n   :figure: 2\n", "thumbnails")
+    assert not warnings
+    (link,) = re.findall(r'<a class="reference internal" href="other.html#one">(.*?)</a>', page)
+    assert re.findall(r"<(img|span)", link) == ["img", "span"] and ">One<" in link
+    assert 'src="_images/b.svg"' in link and 'alt=""' in link and "46em" not in link
+
+
+@pytest.mark.few(0)
+def test_a_page_without_figures_is_told_where_its_small_pictures_would_stand(tmp_path: Path):
+    (tmp_path / "other.rst").write_text(":orphan:\n\nOther\n=====\n", encoding="utf-8")
+    assert "no figures in the sections of other" in built(tmp_path, ".. thumbnails:: other", "thumbnails")[1]
+
+
+@pytest.mark.docs
+def test_the_gallery_begins_with_a_small_picture_of_every_section(site: Path):
+    gallery = (site / "gallery" / "index.html").read_text(encoding="utf-8")
+    for page in ("figures", "paper"):
+        sections = re.findall(r"^## ", (ROOT / "docs" / "gallery" / f"{page}.md").read_text("utf-8"), re.MULTILINE)
+        assert len(re.findall(rf'href="{page}.html#[^"]+"><img', gallery)) == len(sections)
+
+
 @pytest.mark.docs
 def test_the_built_site_has_its_figures_and_no_fault(site: Path):
     assert list(faults(site)) == []
     for page in (
+        "index",
         "gallery/figures",
         "gallery/paper",
+        "guide/influence",
+        "how-to/actuators",
+        "how-to/paper-graph",
+        "how-to/uncertain-weights",
         *(f"tutorial/{one.stem}" for one in ROOT.glob("notebooks/*.ipynb")),
     ):
         html = (site / f"{page}.html").read_text(encoding="utf-8")
