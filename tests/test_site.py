@@ -129,6 +129,7 @@ def built(folder: Path, text: str, *extensions: str) -> tuple[str, str]:
         "extensions": ["formulas", "local_links", *extensions],
         "html_math_renderer": "svg",
         "html_theme": "basic",
+        "suppress_warnings": ["app"],  # that a process builds several sites
     }
     app = Sphinx(folder, None, folder / "out", folder / "doctrees", "html", settings, status=None, warning=warnings)
     app.build()
