@@ -125,6 +125,8 @@ def error_facts(certificate: Certificate, drawn: bool, details: bool) -> Facts:
         told = [_error_fact(standing, text, drawn) for text in _ideal_error(certificate)]
         yield from said_without(certificate, told)
     if details and proof.rate is not None:
+        if proof.envelope.coordinates == "E":
+            yield Fact(head="error", note="E = -L x: by how much each agent differs from what it hears", detail=True)
         yield from said_without(certificate, instants_facts(certificate))
         if certificate.initial_state is not None and not drawn and any(V.deviation for V in proof.functions):
             yield from said_without(certificate, _deviation_facts(certificate))
