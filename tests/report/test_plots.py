@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from asked import certify_words
+from asked import certify_family, certify_words
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import same_color
+from matplotlib.colors import same_color, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch, Polygon
@@ -47,12 +47,23 @@ from ptcc_certify.model.nominal import NominalProtocol
 from ptcc_certify.model.sliding_mode import SlidingModeProtocol
 from ptcc_certify.report.notebook import trajectory_html
 from ptcc_certify.report.page import report_html
-from ptcc_certify.report.plots.camp_lines import CAMP_STYLES, NAME_SIZE, NAMED_AGENTS, NAMED_OF_PART
+from ptcc_certify.report.plots.camp_lines import (
+    CAMP_STYLES,
+    LINE_AGENTS,
+    NAME_LENGTH,
+    NAME_SIZE,
+    NAMED_AGENTS,
+    NAMED_OF_PART,
+    TIME_SHARE,
+)
+from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.decay import plot_decay
-from ptcc_certify.report.plots.distributions import plot_final_states
+from ptcc_certify.report.plots.distributions import plot_degrees, plot_final_states
+from ptcc_certify.report.plots.glance import plot_glance
 from ptcc_certify.report.plots.graph import GROUND, plot_graph, weight_ranges
 from ptcc_certify.report.plots.graph_layout import FREE_NODES, arc
 from ptcc_certify.report.plots.input import plot_effort, plot_input
+from ptcc_certify.report.plots.motion import plot_formation, plot_motion
 from ptcc_certify.report.plots.spectrum import CLASS_MARKERS, plot_frontier, plot_spectrum
 from ptcc_certify.report.plots.style import DOUBLE_COLUMN, EDGE_STYLES, SINGLE_COLUMN, STYLE, save_figure
 from ptcc_certify.report.plots.tracking import plot_tracking
@@ -176,22 +187,34 @@ def test_each_of_few_agents_has_a_line_of_its_camp_and_its_name(name: str) -> No
         assert text.xy[1] == float(peak.largest) < ax.get_ylim()[1] or text.get_text().endswith("above")
 
 
-def test_of_many_agents_the_parts_are_drawn_and_few_agents_named() -> None:
+def test_up_to_60_agents_have_lines_and_those_that_begin_highest_and_lowest_their_names() -> None:
     cert = certified("fig5b")
     run, group = cert.trajectory, np.array(camps(cert.structure))
-    assert run is not None and cert.graph.n_nodes > NAMED_AGENTS
-    for ax, values, middle in (
-        (plot_trajectory(cert), run.states, np.median),
-        (plot_input(cert), np.abs(run.input), np.max),
-    ):
-        shown = labelled(drawn(ax))
-        for part in set(group):
-            rows = values[group == part]
-            assert len(rows) > NAMED_OF_PART
-            line = next(handle for label, handle in shown.items() if label.startswith(part))
-            seen = np.asarray(line.get_ydata())  # type: ignore[attr-defined]
-            assert seen[:50] == pytest.approx(middle(rows, axis=0)[:50])
-        assert len(agent_lines(ax)) <= 2 * len(set(group)) and 2 <= len(ax.texts) <= 9
+    assert run is not None and NAMED_AGENTS < cert.graph.n_nodes <= LINE_AGENTS
+    ax = drawn(plot_trajectory(cert))
+    lines = {line.get_ydata().tobytes(): line for line in agent_lines(ax)}
+    for row, part in zip(run.states, group, strict=True):
+        assert same_color(lines[row.tobytes()].get_color(), CAMP_STYLES[part][0])
+    written = ", ".join(text.get_text() for text in ax.texts)
+    for part in set(group):
+        own = np.flatnonzero(group == part)
+        assert len(own) > NAMED_OF_PART
+        for end in (own[run.states[own, 0].argmin()], own[run.states[own, 0].argmax()]):
+            assert cert.graph.labels[end] in written.split(", ")
+
+
+@pytest.mark.few(0)
+def test_of_more_than_60_agents_the_parts_are_drawn_as_their_range_and_mean() -> None:
+    ring = SignedDigraph.from_edges([(k, (k + 1) % 64, -1 if k in (5, 30) else 1) for k in range(64)])
+    run = simulate(ring, PROTOCOL, [float(k * (-1) ** k) for k in range(64)])
+    ax, group = drawn(plot_trajectory(run)), np.array(camps(analyse(ring)))
+    for part in ("first camp", "second camp"):
+        rows = run.states[group == part]
+        assert labelled(ax)[part].get_ydata() == pytest.approx(rows.mean(axis=0))  # type: ignore[attr-defined]
+        (shade,) = [one for one in ax.collections if same_color(one.get_facecolor()[0][:3], CAMP_STYLES[part][0])]
+        inside = shade.get_paths()[0].vertices  # type: ignore[union-attr]
+        assert [inside[:, 1].min(), inside[:, 1].max()] == pytest.approx([rows.min(), rows.max()])
+    assert len(agent_lines(ax)) == 4 and len(ax.texts) >= 4
 
 
 @pytest.mark.few(0)
@@ -814,6 +837,93 @@ def test_no_text_of_a_figure_overlaps_another_or_leaves_the_figure_or_is_small()
             width = min(box.x1, near.x1) - max(box.x0, near.x0)
             height = min(box.y1, near.y1) - max(box.y0, near.y0)
             assert width < 1 or height < 2, (name, text.get_text(), other.get_text())
+
+
+@cache
+def further() -> list[Figure]:
+    """Figures of every other kind: of families, of agents of order n, of many agents, at a glance."""
+    day = ptcc_certify.as_family([("ann", "bob", 1, 2), ("bob", "eve", -1, -1)])
+    night = SignedDigraph.from_edges([("ann", "bob", 1), ("bob", "eve", -2)])
+    family = certify_family(Family.switching({"day": day, "night": night}), PROTOCOL, [1, 4, -3])
+    depends = certify_family(ptcc_certify.as_family([("a", "b", 1, 1), ("b", "a", -1, 0)]), PROTOCOL, [1, 4])
+    asked: dict[str, Any] = {"agents": ptcc_certify.Agents(order=2), "asks": Asks(method="paper", simulation=False)}
+    plane = certify(CHAIN, PROTOCOL, [[k, 2 - k] for k in range(4)], **asked)
+    parts = depends.family_proof.parts
+    drawn = [plot_graph(family), plot_trajectory(family), plot_decay(family), plot_input(family)]
+    drawn += [plot_counterexample(parts[0].component), plot_final_states(certified("fig5b")), plot_formation(plane)]
+    drawn += [plot_degrees(CHAIN), plot_motion(plane), *map(plot_glance, (family, plane, certified("fig3b")))]
+    return [one.figure for one in drawn]
+
+
+def light(colour: Any) -> np.ndarray:
+    """Red, green and blue as light, without the gamma of sRGB."""
+    rgb = np.array(to_rgb(colour))
+    return np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+
+
+def contrast(colour: Any) -> float:
+    """The contrast to white by WCAG 2."""
+    return float(1.05 / (light(colour) @ [0.2126, 0.7152, 0.0722] + 0.05))
+
+
+@pytest.mark.few(0)
+def test_every_text_of_every_figure_is_dark_enough_on_white_and_white_ones_stand_on_dark_nodes() -> None:
+    seen = 0
+    for figure in [*gallery().values(), *further()]:
+        for ax in figure.axes:
+            nodes = [
+                line.get_color() for line in ax.lines if line.get_marker() in ("o", "s", "D") and len(line.get_xdata())
+            ]
+            for text in (text for text in ax.texts if same_color(text.get_color(), "white")):
+                assert nodes and min(contrast(node) for node in nodes if not same_color(node, "white")) >= 4.5, text
+        colours = {text.get_color() for text in figure.findobj(Text) if text.get_text().strip()}
+        seen += len(colours)
+        assert all(contrast(colour) >= 4.5 or same_color(colour, "white") for colour in colours), colours
+    assert seen > 60
+
+
+#: What is left of light to eyes without cones of green: Machado, Oliveira and Fernandes (2009), severity 1.
+DEUTERANOPIA = np.array(
+    [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]]
+)
+
+
+def lab(rgb: np.ndarray) -> np.ndarray:
+    """CIE L*a*b* of linear light of sRGB."""
+    to_xyz = np.array(
+        [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
+    )
+    xyz = to_xyz @ np.clip(rgb, 0, 1) / [0.95047, 1, 1.08883]
+    f = np.where(xyz > 216 / 24389, np.cbrt(xyz), (24389 / 27 * xyz + 16) / 116)
+    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
+
+
+def test_camps_differ_in_their_lines_and_to_eyes_without_cones_of_green_in_their_colours() -> None:
+    """The distance is that of CIE 1976, of which about 2 is just seen; edges of either sign, and their lines, too."""
+    styles = {name: style for name, style in CAMP_STYLES.items() if name != "agents"}  # where no other part is
+    for (one, (colour, line)), (other, (second, dashes)) in combinations(styles.items(), 2):
+        for seen in (np.eye(3), DEUTERANOPIA):
+            apart = np.linalg.norm(lab(seen @ light(colour)) - lab(seen @ light(second)))
+            assert apart >= 20, (one, other, apart)
+        assert line != dashes
+    (ally, line, _), (opponent, dashes, _) = EDGE_STYLES.values()
+    assert np.linalg.norm(lab(DEUTERANOPIA @ light(ally)) - lab(DEUTERANOPIA @ light(opponent))) >= 20
+    assert line != dashes
+
+
+@pytest.mark.few(0)
+@pytest.mark.parametrize("names", ["abcd", "a very long name of somebody", "fourteen wide", "北京市朝阳区"])
+def test_names_leave_more_than_half_of_the_width_to_the_time_up_to_the_deadline(names: str) -> None:
+    labels = [f"{names[:-2]}{k} {names[-2:]}" for k in range(4)]
+    graph = SignedDigraph.from_edges([(a, b, 1) for a, b in pairwise(labels)])
+    cert = certify(graph, PROTOCOL, [1, -2, 3, 7], asks=Asks(simulation=False))
+    for ax in (plot_trajectory(cert), plot_input(cert), *plot_glance(cert).axes[1:]):
+        whole = ax.figure.figure if ax.get_subplotspec() is None else ax.figure
+        FigureCanvasAgg(ax.figure.figure).draw()  # type: ignore[union-attr]
+        begin, end = ax.transData.transform([[0, 0], [1, 0]])[:, 0]
+        assert end - begin >= (TIME_SHARE - 0.03) * whole.bbox.width  # the room of the axis is an estimate
+        for text in ax.texts:
+            assert all(len(line) <= NAME_LENGTH + 9 for line in text.get_text().split("\n"))
 
 
 @pytest.mark.few(0)

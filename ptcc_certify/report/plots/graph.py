@@ -20,7 +20,7 @@ from ptcc_certify.report.plots.adjacency import draw_adjacency
 from ptcc_certify.report.plots.camp_lines import CAMP_STYLES, camp_groups, family_camps, family_groups
 from ptcc_certify.report.plots.graph_labels import INSIDE, boxes_along, draw_labels, draw_sizes
 from ptcc_certify.report.plots.graph_layout import FREE_NODES, Arrow, places_and_bends, triangles_of
-from ptcc_certify.report.plots.style import EDGE_STYLES, SINGLE_COLUMN, axes_of, finished, styled
+from ptcc_certify.report.plots.style import BEHIND, EDGE_STYLES, SINGLE_COLUMN, axes_of, finished, styled
 from ptcc_certify.report.plots.subject import is_of_family, structure_of
 from ptcc_certify.report.text_layout import columns, printable, shorten_text
 from ptcc_certify.theorems.counterexample_text import mode_name
@@ -291,7 +291,7 @@ def _draw_coloured(
         ax.plot([], [], "o", color="white", markersize=6, label="leads", **outline)
     for name, (marker, _) in _SHAPES.items():
         if (groups == name).any():
-            ax.plot([], [], marker, color="0.5", markersize=6, label=name)
+            ax.plot([], [], marker, color=BEHIND, markersize=6, label=name)
 
 
 def _draw_arrows(

@@ -30,8 +30,9 @@ STYLE = "ptcc_certify.ptcc"
 SINGLE_COLUMN, DOUBLE_COLUMN = (3.5, 2.7), (7.16, 2.9)
 #: What figures are saved as; PDF and SVG are vectors.
 FIGURES = (".png", ".pdf", ".svg")
-#: Colours that the colour-blind tell apart (Okabe and Ito): what runs, what bounds it, what stands behind.
-RUN, BOUND, BEHIND = "#0072B2", "#D55E00", "#7F7F7F"
+#: Colours of what runs, what bounds it, what stands behind. All colours of figures are dark enough for names on white,
+#: a contrast of 4.5 and more, and those of camps stay apart for eyes without the cones of green.
+RUN, BOUND, BEHIND = "#0072B2", "#B84E00", "#707070"
 #: Colour and line of an edge from an ally (+1) or an opponent (-1); no camp has them.
 EDGE_STYLES = {1: ("#117733", "-", "from an ally"), -1: ("#882255", "--", "from an opponent")}
 #: Characters of the title of a legend for an inch of the axes below it.

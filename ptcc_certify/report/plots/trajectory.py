@@ -50,8 +50,8 @@ def plot_trajectory(
     """Draw the states ``x_k(t)`` of one run, in the colours and lines of the camps, and the deadline ``T``.
 
     In a formation these are positions, the places added.
-    Of up to eight agents each has a line with its name. Of more, parts of the graph with more than three agents are
-    drawn as their range and median, and the agents that begin highest and lowest by name.
+    Of up to eight agents each line has its name, of more those of the agents that begin highest and lowest in each part
+    of the graph. Of more than 60 agents these parts are drawn as their range and mean.
 
     Of the certificate of a family thin lines are runs under random signals, thicker ones under worst cases, in the
     colours and lines of the camps: those of the consensus, or what agents are in every mode. Shaded: where those of a
