@@ -56,7 +56,8 @@ def _panels(runs: Sequence[Run], what: str) -> Figure:
         figure = Figure((width, height), layout="constrained")
         for place, (example, graph, certificate) in enumerate(runs, start=1):
             ax = new_axes(figure, (1, len(runs), place))
-            PLOTS[_PLOTS.get(what, what)](certificate, ax=ax)
+            others = {"beside": [run.certificate for run in runs]} if what == "input" else {}
+            PLOTS[_PLOTS.get(what, what)](certificate, ax=ax, **others)
             claim = certificate.graph_proof.claim
             ax.set_title(f"({'ab'[example.graphs.index(graph)]}) {graph}: {claim.behaviour if claim else ''}")
         return share_legend(figure, 2 * len(runs) + 1)

@@ -147,7 +147,7 @@ def camps(structure: Structure) -> list[str]:
 def shows(drawn: np.ndarray, row: np.ndarray, scale: float) -> bool:
     """Whether a line is that of an agent; gaps, where nothing is resolved, hide nothing that is large at the start."""
     gaps = np.isnan(drawn)
-    return np.array_equal(drawn[~gaps], row[~gaps]) and not (gaps[0] and row[0] > 1e-6 * scale)
+    return np.array_equal(drawn[~gaps], row[~gaps]) and not (gaps[0] and abs(row[0]) > 1e-6 * scale)
 
 
 # ---------------------------------------------------------------------- agents over time
@@ -171,7 +171,7 @@ def test_each_of_few_agents_has_a_line_of_its_camp_and_its_name(name: str) -> No
     run = cert.trajectory
     assert run is not None and cert.graph.n_nodes <= NAMED_AGENTS
     states, ax = drawn(plot_trajectory(cert)), drawn(plot_input(cert))
-    for values, axes in ((run.states, states), (np.abs(run.input), ax)):
+    for values, axes in ((run.states, states), (run.input, ax)):
         scale = np.abs(values[:, :1]).max()
         assert len(agent_lines(axes)) == cert.graph.n_nodes
         for row, camp in zip(values, camps(cert.structure), strict=True):
@@ -185,6 +185,8 @@ def test_each_of_few_agents_has_a_line_of_its_camp_and_its_name(name: str) -> No
     if text is not None and peak is not None:
         assert float(text.get_text().split()[2].strip(",")) >= peak.largest >= np.abs(run.input).max() * (1 - 1e-9)
         assert text.xy[1] == float(peak.largest) < ax.get_ylim()[1] or text.get_text().endswith("above")
+        lines = {height for line in ax.lines for height in line.get_ydata() if abs(height) == float(peak.largest)}
+        assert len(lines) == (0 if text.get_text().endswith("above") else 2)  # above and below
 
 
 def test_up_to_60_agents_have_lines_and_those_that_begin_highest_and_lowest_their_names() -> None:
@@ -269,7 +271,7 @@ def test_of_a_certificate_under_limits_the_run_under_them_is_drawn_and_they_are_
         legend = ax.get_legend()
         assert legend is not None and cert.trajectory is not None
         titles[name] = legend.get_title().get_text()
-        first = np.nanmax([line.get_ydata()[0] for line in agent_lines(ax)])  # type: ignore[index]
+        first = np.nanmax([abs(line.get_ydata()[0]) for line in agent_lines(ax)])  # type: ignore[index]
         for other in (plot_trajectory(cert), plot_decay(cert)):
             assert other.get_legend().get_title().get_text() == titles[name]  # type: ignore[union-attr]
         ideal = np.abs(cert.trajectory.input[:, 0]).max()
@@ -314,7 +316,7 @@ def test_inputs_of_agents_of_order_n_are_drawn_below_their_proved_peak(agents: A
     ax, run = drawn(cert.plot("input")), cert.agents.simulate()
     peak = peak_of(ax)
     assert peak is not None and float(peak.get_text().split()[2].rstrip(",")) >= max(cert.agents.input)
-    highest = max(np.nanmax(line.get_ydata()) for line in agent_lines(ax))  # type: ignore[type-var]
+    highest = max(np.nanmax(np.abs(line.get_ydata())) for line in agent_lines(ax))  # type: ignore[arg-type]
     assert highest == pytest.approx(np.nanmax(np.linalg.norm(run.input, axis=1)), rel=1e-6)
     assert highest <= max(cert.agents.input)
 
@@ -346,9 +348,9 @@ def test_an_input_without_bound_is_drawn_with_its_start() -> None:
     cert = certify(pair, slow, [1, -1])
     assert cert.trajectory is not None
     ax = drawn(plot_input(cert))
-    size = np.abs(cert.trajectory.input)
-    assert ax.get_ylim()[0] < size[:, 0].min() < 1e-3 * size.max() < size.max() < ax.get_ylim()[1]
-    assert ax.get_yscale() == "log" and peak_of(ax) is None
+    u = cert.trajectory.input
+    assert ax.get_ylim()[0] < u.min() < 1e3 * u[:, 0].min() < 1e3 * u[:, 0].max() < u.max() < ax.get_ylim()[1]
+    assert ax.get_yscale() == "symlog" and peak_of(ax) is None
 
 
 @pytest.mark.few(0)
@@ -368,7 +370,7 @@ def test_the_input_of_the_sliding_mode() -> None:
     assert run.sliding is not None
     late = run.t > float(run.protocol.T)  # there the input answers the disturbance alone
     answers = {line.get_ydata()[late].round(6).tobytes() for line in agent_lines(ax)}
-    assert answers == {row.round(6).tobytes() for row in np.abs(run.sliding.disturbance[:, late])}
+    assert answers == {(0.0 - row).round(6).tobytes() for row in run.sliding.disturbance[:, late]}
     other = certify(graph, example.protocol(), InitialState(start, sigma0=[1.0] * 6), asks=Asks(simulation=False))
     with pytest.raises(ValueError, match=r"another sigma\(0\) than"):
         plot_input(cert.trajectory, certificate=other)
@@ -556,7 +558,7 @@ def test_short_labels_of_40_agents_stand_in_their_nodes() -> None:
 
 @pytest.mark.few(0)
 def test_the_axis_of_an_input_that_is_large_for_a_short_time_alone_is_logarithmic() -> None:
-    for name, scale in (("fig1a", "log"), ("fig3a", "linear")):
+    for name, scale in (("fig1a", "symlog"), ("fig3a", "linear")):
         example, _, _ = select(name)[name == "fig1a"]
         sigma0 = example.sigma0 and example.sigma0.split(",")
         cert = certify(
@@ -571,6 +573,17 @@ def test_the_axis_of_an_input_that_is_large_for_a_short_time_alone_is_logarithmi
         assert ("$T_r$" in labelled(end)) == (example.sigma0 is not None)
         if example.sigma0 is not None:
             assert labelled(end)["$T_r$"].get_xdata()[0] == pytest.approx(float(example.protocol().reaching.T_r))  # type: ignore[attr-defined,union-attr]
+
+
+@pytest.mark.few(0)
+def test_inputs_of_two_panels_have_one_axis() -> None:
+    steep, flat = certified("sliding"), certified("fig3b")
+    left, right = Figure().subplots(1, 2)
+    for ax, cert in ((left, steep), (right, flat)):
+        drawn(plot_input(cert, ax=ax, beside=[steep, flat]))
+    assert left.get_ylim() == right.get_ylim() and left.get_yscale() == right.get_yscale() == "symlog"
+    assert list(left.get_yticks()) == list(right.get_yticks()) and 0 in left.get_yticks()
+    assert plot_input(flat).get_yscale() == "linear"
 
 
 def test_the_bound_of_a_disconnected_graph_is_named_by_the_theorems_of_its_components() -> None:

@@ -21,7 +21,7 @@ PANELS = {
     "states": "States over time",
     "decay": "Error under its proved bound",
     "graph": "The graph: who listens to whom",
-    "input": "Size of the input over time",
+    "input": "Input over time",
     "sliding": "Sliding variables over time",
 }
 #: Share of the initial error down to which the decay is drawn, below which the integrator resolves little; and of time.

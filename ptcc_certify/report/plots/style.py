@@ -157,9 +157,19 @@ def tick_count(axis: Axis, most: int = 6) -> int:
 def place_ticks(axis: Axis) -> None:
     """Place ticks that do not collide: on a logarithmic axis at decades, over two or so at 1, 2, 5 too.
 
-    Ticks that were placed by hand stay.
+    Of an axis that is logarithmic on both sides of 0 they are at equal decades of both. Ticks that were placed by hand
+    stay.
     """
     if isinstance(axis.get_major_locator(), FixedLocator):
+        return
+    if axis.get_scale() == "symlog":
+        low, high = axis.get_view_interval()
+        least = math.ceil(math.log10(axis.get_transform().linthresh) - 1e-9)  # type: ignore[attr-defined]
+        sides = [(sign, math.floor(math.log10(max(sign * end, 1e-300)))) for sign, end in ((-1, low), (1, high))]
+        step = max(1, -(-sum(max(most - least + 1, 0) for _, most in sides) // tick_count(axis, 8)))
+        ticks = [sign * 10.0**k for sign, most in sides for k in range(least, most + 1, step)]
+        axis.set_major_locator(FixedLocator([0, *ticks]))
+        axis.set_minor_locator(NullLocator())
         return
     if axis.get_scale() != "log":
         axis.set_major_locator(MaxNLocator(tick_count(axis), steps=STEPS))

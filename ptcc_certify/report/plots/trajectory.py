@@ -95,7 +95,8 @@ def plot_trajectory(
         named, limits = draw_agents(ax, run, values, structure_of(subject)), None
         title = limits_text(run, subject if isinstance(subject, Certificate) else None)
     draw_deadlines(ax, run)
-    name_agents(ax, run, values, named, ends=limits is None)
+    until = None if limits is None else float(run.t[-1])  # beyond T stand bars of final states
+    name_agents(ax, run, values, named, ends=limits is None, until=until)
     if limits is not None:
         ax.set_ylim(limits)
     return finished(ax, time_label("time $t$", time_unit), "state $x_k$", title)
