@@ -576,6 +576,35 @@ def test_the_axis_of_an_input_that_is_large_for_a_short_time_alone_is_logarithmi
 
 
 @pytest.mark.few(0)
+def test_what_is_small_at_the_deadline_is_drawn_on_the_axis_of_remaining_time() -> None:
+    protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
+    for name, asked in MOVING.items():
+        cert = certify_words(CHAIN, protocol, [1, 3, -2, 4], method="perron", simulation=False, **asked)
+        assert cert.late is not None
+        times = np.array([0, 0.5, 1 - 1e-6, 1, 1.5 if cert.late.tracks else 1])
+        bound = cert.late.largest_bound(times)
+        small = bool(bound[-2:].max() < bound[0] / 100)
+        ax, over_time = drawn(plot_tracking(cert)), drawn(plot_tracking(cert, axis="time"))
+        assert ax.get_xlabel().startswith("remaining time" if small else "time"), (name, bound)
+        assert over_time.get_xlabel() == "time $t$" and over_time.get_xscale() == "linear"
+        left = drawn(plot_tracking(cert, axis="left"))
+        q, values = labelled(left)["proved bound"].get_data()  # type: ignore[attr-defined]
+        assert np.interp([1 - t for t in times[:3]], q[::-1], values[::-1]) == pytest.approx(bound[:3], rel=1e-3)
+        assert left.get_xlim()[0] == 1 > left.get_xlim()[1] > 0 and (values[q >= left.get_xlim()[1]] > 0).all()
+    with pytest.raises(ParameterError, match="unknown; one of left, time"):
+        plot_tracking(cert, axis="clock")  # type: ignore[arg-type]
+
+
+@pytest.mark.few(0)
+def test_what_oscillates_after_the_deadline_is_drawn_with_40_samples_a_period() -> None:
+    run, graph = certified("sliding").trajectory, graph_of("fig3b")
+    assert run is not None and "sin(2*k*t" in str(EXAMPLES[5].disturbance)
+    shaken = simulate(graph, PROTOCOL, range(6), disturbance=Bounded("sin(k*9*t)", 1), actuator=GainLimits(gain_cap=9))
+    for t, deadline, period in ((run.t, 1.5, math.pi / graph.n_nodes), (shaken.t, 1, 2 * math.pi / 54)):
+        assert (np.diff(t[t >= deadline]) <= period / 40).all()
+
+
+@pytest.mark.few(0)
 def test_inputs_of_two_panels_have_one_axis() -> None:
     steep, flat = certified("sliding"), certified("fig3b")
     left, right = Figure().subplots(1, 2)

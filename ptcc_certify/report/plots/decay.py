@@ -20,7 +20,7 @@ from ptcc_certify.report.plots.subject import certifies_family, ideal_run_of, id
 from ptcc_certify.simulation.trajectory import Trajectory
 
 #: Horizontal axes of the decay, and their labels; that of time has a unit.
-_DECAY_AXES = {"left": "remaining time, $1 - t/T$", "time": "time $t$", "clock": "stretched clock $s(t)$"}
+DECAY_AXES = {"left": "remaining time, $1 - t/T$", "time": "time $t$", "clock": "stretched clock $s(t)$"}
 #: What is drawn below the integrator's floor, as a share of it.
 _BELOW_FLOOR = 1e-2
 #: 1 - t/T down to which bounds are drawn where there is no run, and how many instants.
@@ -94,8 +94,8 @@ def plot_decay(
     >>> [line.get_label() for line in plot_decay(cert.trajectory).lines]
     ['simulated (CVODES)', "integrator's floor"]
     """
-    if axis not in _DECAY_AXES:
-        raise ParameterError(f'axis "{axis}" is unknown; one of {", ".join(_DECAY_AXES)}')
+    if axis not in DECAY_AXES:
+        raise ParameterError(f'axis "{axis}" is unknown; one of {", ".join(DECAY_AXES)}')
     if certifies_family(subject):
         return _draw_signals(axes_of(ax), subject, runs_of(subject, runs), axis, time_unit)
     proved = subject if isinstance(subject, Certificate) else certificate
@@ -136,7 +136,7 @@ def plot_decay(
         ax.axvline(at, color="black", linewidth=0.8, linestyle=(0, (5, 2, 1, 2)), label="$T_r$")
     name = r"\varepsilon" if proved is not None and proved.graph_proof.envelope.coordinates == "eps" else "E"
     title = "" if run is None else limits_text(run if asked is None else asked, proved)
-    return finished(ax, _label(axis, time_unit), rf"$\|{name}(t)\| \,/\, \|{name}(0)\|$", title)
+    return finished(ax, axis_label(axis, time_unit), rf"$\|{name}(t)\| \,/\, \|{name}(0)\|$", title)
 
 
 def _draw_signals(ax: Axes, certificate: Certificate, runs: Sequence[Trajectory], axis: str, time_unit: str) -> Axes:
@@ -162,7 +162,7 @@ def _draw_signals(ax: Axes, certificate: Certificate, runs: Sequence[Trajectory]
     _draw_floor(ax, floor, floor / 10)
     last = int(np.flatnonzero(bound >= floor / 10)[-1])
     _scale(ax, axis, place[[0, max(last, 1)]], (floor / 10, 3 * float(bound[np.isfinite(bound)].max())))
-    return finished(ax, _label(axis, time_unit), r"$\max_k |x_k(t) - x_k(T)|$")
+    return finished(ax, axis_label(axis, time_unit), r"$\max_k |x_k(t) - x_k(T)|$")
 
 
 def _known_end(certificate: Certificate) -> np.ndarray | None:
@@ -180,8 +180,9 @@ def _scale(ax: Axes, axis: str, ends: np.ndarray, limits: tuple[float, float]) -
     ax.set_xlim(*ends)
 
 
-def _label(axis: str, time_unit: str) -> str:
-    return time_label(_DECAY_AXES[axis], time_unit) if axis == "time" else _DECAY_AXES[axis]
+def axis_label(axis: str, time_unit: str) -> str:
+    """Return the label of one of :data:`DECAY_AXES`."""
+    return time_label(DECAY_AXES[axis], time_unit) if axis == "time" else DECAY_AXES[axis]
 
 
 def _draw_floor(ax: Axes, floor: float, bottom: float) -> None:
