@@ -18,7 +18,14 @@ from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.report.facts.input import initial_states_text
 from ptcc_certify.report.plots.camp_lines import NAME_SIZE, draw_agents, draw_deadlines, name_agents
 from ptcc_certify.report.plots.motion import agents_run
-from ptcc_certify.report.plots.runs_under_signals import bound_label, count_of_signals, is_worst, line_of, runs_of
+from ptcc_certify.report.plots.runs_under_signals import (
+    bound_label,
+    count_of_signals,
+    is_worst,
+    line_of,
+    no_bound_text,
+    runs_of,
+)
 from ptcc_certify.report.plots.style import BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.report.plots.subject import certifies_family, limits_text, require_same, structure_of, trajectory_of
 from ptcc_certify.simulation.agents import AgentsTrajectory
@@ -76,7 +83,8 @@ def plot_input(
     if anything does; the legend names them. A held input is drawn in steps if every period is sampled.
 
     Of a family the largest input under each of many signals is drawn, below its bound for every signal; signals of a
-    search for worst cases keep the error large, and their inputs need not be: "slowest found". Of agents of order n it
+    search for worst cases keep the error large, and their inputs need not be: "slowest found". Where no bound holds the
+    legend says why. Of agents of order n it
     is each agent's input, in several dimensions its size, under the sliding-mode protocol of its nominal part; the peak
     is of the whole.
 
@@ -115,9 +123,10 @@ def plot_input(
     ax, x = axes_of(ax), time_label("time $t$", time_unit)
     if certifies_family(subject):
         runs = runs_of(subject, runs)
-        _draw_signals(ax, subject, runs)
+        bounded = _draw_signals(ax, subject, runs)
         draw_deadlines(ax, runs[0])
-        return finished(ax, x, r"$\max_k |u_k|$", count_of_signals(subject, runs))
+        words = [count_of_signals(subject, runs), *([] if bounded else [no_bound_text(subject)])]
+        return finished(ax, x, r"$\max_k |u_k|$", "; ".join(words))
     drawn = _inputs_of(subject, certificate)
     run = drawn.run
     structure = analyse(run.graph) if isinstance(run, AgentsTrajectory) else structure_of(subject)
@@ -162,8 +171,11 @@ def _inputs_of(subject: Any, certificate: Certificate | None) -> _Inputs:
     return _Inputs(run, _resolved_input(run), False, peaks, "input $u_k$", limits_text(run, certificate), steps)
 
 
-def _draw_signals(ax: Axes, certificate: Certificate, runs: Sequence[Trajectory]) -> None:
-    """Draw the largest input under many signals below its bound for every signal, and the proved peak."""
+def _draw_signals(ax: Axes, certificate: Certificate, runs: Sequence[Trajectory]) -> bool:
+    """Draw the largest input under many signals below its bound for every signal, and the proved peak.
+
+    Tell whether there is such a bound.
+    """
     proof = certificate.family_proof
     first, gain = runs[0], certificate.protocol.gain
     before = first.remaining > 0
@@ -179,12 +191,13 @@ def _draw_signals(ax: Axes, certificate: Certificate, runs: Sequence[Trajectory]
         ax.plot(run.t[own], resolved, label=names.pop(is_worst(run), None), **line_of(run))
         sizes.append(np.interp(first.t, run.t[own], np.nan_to_num(resolved), right=0.0))
     bound = proof.input_bound(left).max(axis=0)
-    if np.isfinite(bound).all():
+    if bounded := bool(np.isfinite(bound).all()):
         ax.plot(t, bound, color=BOUND, linewidth=1.8, label=bound_label(certificate))
         sizes.append(np.interp(first.t, t, bound, right=0.0))
     peaks = [Peak(float(peak), f"certified peak {up(peak, 4)}") for peak in sorted(proof.input_peaks or ())[-1:]]
     _draw_peaks(ax, first.t, np.array(sizes), peaks, _axis_of(first.t, np.array(sizes), peaks, signed=False))
     ax.set_xlim(0, float(first.t[-1]))
+    return bounded
 
 
 def _axis_of(t: np.ndarray, values: np.ndarray, peaks: Sequence[Peak], *, signed: bool) -> InputAxis:
