@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 
 from ptcc_certify.report.example_results import Run
 from ptcc_certify.report.page_figures import PLOTS
-from ptcc_certify.report.plots.style import DOUBLE_COLUMN, SINGLE_COLUMN, STYLE, new_axes, share_legend
+from ptcc_certify.report.plots.sizes import DOUBLE_COLUMN, SINGLE_COLUMN
+from ptcc_certify.report.plots.style import STYLE, new_axes, share_legend
 
 #: The plots of those figures of the paper that have a name of their own.
 _PLOTS = {"graphs": "graph", "sliding_variables": "sliding"}

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import inspect
 import math
+import re
+import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -64,8 +66,9 @@ from ptcc_certify.report.plots.graph import GROUND, plot_graph, weight_ranges
 from ptcc_certify.report.plots.graph_layout import FREE_NODES, arc
 from ptcc_certify.report.plots.input import plot_effort, plot_input
 from ptcc_certify.report.plots.motion import plot_formation, plot_motion
+from ptcc_certify.report.plots.sizes import DOUBLE_COLUMN, SINGLE_COLUMN, figures_for
 from ptcc_certify.report.plots.spectrum import CLASS_MARKERS, plot_frontier, plot_spectrum
-from ptcc_certify.report.plots.style import DOUBLE_COLUMN, EDGE_STYLES, SINGLE_COLUMN, STYLE, save_figure
+from ptcc_certify.report.plots.style import EDGE_STYLES, STYLE, save_figure
 from ptcc_certify.report.plots.tracking import plot_tracking
 from ptcc_certify.report.plots.trade_off import plot_trade_off
 from ptcc_certify.report.plots.trajectory import plot_run, plot_sliding, plot_trajectory
@@ -1259,3 +1262,70 @@ def test_states_of_very_different_sizes_are_those_of_the_certificate(tmp_path: P
     leaders, limits = MovingLeaders(speed="0.355"), GainLimits(gain_cap="2.28")
     moved = certify(graph, protocol, start, leaders=leaders, limits=limits, asks=Asks(simulation=False))
     assert write_report(moved, tmp_path / "moved.html") == "certified"
+
+
+# ---------------------------------------------------------------------- journals and slides
+
+
+def saved_size(path: Path) -> tuple[float, float]:
+    """Width and height of a saved figure in inches."""
+    data = path.read_bytes()
+    if path.suffix == ".png":
+        place = data.index(b"pHYs") + 4
+        across = int.from_bytes(data[place : place + 4])  # per metre
+        return tuple(int.from_bytes(data[k : k + 4]) / across / 0.0254 for k in (16, 20))  # type: ignore[return-value]
+    size = re.search(rb"(?:MediaBox \[ 0 0 |width=\")([\d.]+)(?: |pt\" height=\")([\d.]+)", data)
+    assert size is not None
+    return float(size[1]) / 72, float(size[2]) / 72
+
+
+@pytest.mark.few(1)
+@pytest.mark.parametrize("suffix", [".png", ".pdf", ".svg"])
+@pytest.mark.parametrize(("purpose", "text"), [("ieee", 8.0), ("nature", 7.0), ("slide", 18.0)])
+def test_figures_have_the_width_and_the_text_of_what_they_are_for(
+    purpose: str, text: float, suffix: str, tmp_path: Path
+) -> None:
+    run, path = certified("fig3b").trajectory, tmp_path / f"a{suffix}"
+    with figures_for(purpose) as sizes:
+        for wide in (False, True):
+            figure = plot_run(run, wide=wide)
+            save_figure(figure, path)
+            width, height = saved_size(path)
+            assert width == pytest.approx(sizes.widths[wide], abs=2 / 300)
+            assert purpose != "slide" or height == pytest.approx(width * 9 / 16, abs=2 / 300)
+            drawn_to_saved = width / figure.get_figwidth()
+            assert figure.axes[0].xaxis.label.get_size() * drawn_to_saved == pytest.approx(text, rel=0.01)
+        if suffix == ".pdf" and purpose != "ieee":
+            streams = re.findall(rb"stream\r?\n(.*?)\r?\nendstream", path.read_bytes(), re.DOTALL)
+            (page,) = [content for content in map(inflated, streams) if b" cm" in content[:200]]
+            assert float(page.split(b" 0 0 ")[0].split()[-1]) == pytest.approx(drawn_to_saved, rel=1e-3)
+    save_figure(plot_run(run), path)
+    assert saved_size(path) == pytest.approx(SINGLE_COLUMN, abs=2 / 300)  # as before
+    with figures_for(purpose, width=5):
+        for drawing in (plot_graph(certified("fig3b")), plot_glance(certified("fig3b"))):
+            save_figure(drawing, path)
+            assert saved_size(path)[0] == pytest.approx(5, abs=2 / 300)
+
+
+def inflated(stream: bytes) -> bytes:
+    """The content of a stream of a PDF that is text."""
+    try:
+        return zlib.decompress(stream)
+    except zlib.error:
+        return b""
+
+
+def test_states_have_their_unit_on_every_axis_of_theirs() -> None:
+    cert = certified("sliding")
+    with figures_for(state_unit="m"):
+        assert plot_trajectory(cert).get_ylabel() == "state $x_k$ (m)"
+        assert plot_sliding(cert).get_ylabel() == "sliding variable $\\sigma_k$ (m)"
+        assert plot_glance(cert).axes[1].get_ylabel() == "state $x_k$ (m)"
+        assert plot_input(cert).get_ylabel() == "input $u_k$"
+    assert plot_trajectory(cert).get_ylabel() == "state $x_k$"
+
+
+def test_what_figures_are_not_made_for_is_refused() -> None:
+    for words, told in (({"purpose": "poster"}, "one of ieee, nature, slide"), ({"width": 0}, "0.5 to 100 inches")):
+        with pytest.raises(ParameterError, match=told), figures_for(**words):  # type: ignore[arg-type]
+            pass

@@ -14,7 +14,8 @@ from matplotlib.figure import Figure
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.report.page_figures import PLOTS
 from ptcc_certify.report.plots.decay import error_norm, resolved
-from ptcc_certify.report.plots.style import BOUND, RUN, SINGLE_COLUMN, STYLE, figure_bytes, finished, new_axes
+from ptcc_certify.report.plots.sizes import SINGLE_COLUMN
+from ptcc_certify.report.plots.style import BOUND, RUN, STYLE, figure_bytes, finished, new_axes
 
 #: The panels, in the order in which they stand, and what they show.
 PANELS = {

@@ -24,16 +24,8 @@ from ptcc_certify.report.plots.camp_lines import (
     draw_deadlines,
     name_agents,
 )
-from ptcc_certify.report.plots.style import (
-    BEHIND,
-    SINGLE_COLUMN,
-    axes_of,
-    finished,
-    new_axes,
-    shown,
-    styled,
-    time_label,
-)
+from ptcc_certify.report.plots.sizes import DOUBLE_COLUMN, SINGLE_COLUMN, current_sizes
+from ptcc_certify.report.plots.style import BEHIND, axes_of, finished, new_axes, shown, styled, time_label
 from ptcc_certify.report.plots.subject import read_back
 from ptcc_certify.report.text_layout import printable, shorten_text
 from ptcc_certify.simulation.agents import AgentsTrajectory
@@ -105,7 +97,8 @@ def plot_motion(subject: Any, *, wide: bool = False, time_unit: str = "") -> Fig
     width, height = SINGLE_COLUMN
     with style.context(STYLE):
         rows, columns = (n, d) if wide else (n * d, 1)
-        figure = Figure((2 * width if wide else width, 0.75 * height * rows), layout="constrained")
+        size = (DOUBLE_COLUMN[0] if wide else width), 0.75 * height * rows
+        figure = Figure(current_sizes().of(size), layout="constrained")
         structure = analyse(run.graph)
         for i in range(n):
             for q in range(d):

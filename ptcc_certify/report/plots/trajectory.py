@@ -24,18 +24,8 @@ from ptcc_certify.report.plots.camp_lines import (
     name_agents,
 )
 from ptcc_certify.report.plots.runs_under_signals import bound_label, count_of_signals, is_worst, runs_of
-from ptcc_certify.report.plots.style import (
-    BEHIND,
-    BOUND,
-    DOUBLE_COLUMN,
-    SINGLE_COLUMN,
-    axes_of,
-    finished,
-    new_axes,
-    share_legend,
-    styled,
-    time_label,
-)
+from ptcc_certify.report.plots.sizes import DOUBLE_COLUMN, SINGLE_COLUMN, current_sizes
+from ptcc_certify.report.plots.style import BEHIND, BOUND, axes_of, finished, new_axes, share_legend, styled, time_label
 from ptcc_certify.report.plots.subject import certifies_family, limits_text, structure_of, trajectory_of
 from ptcc_certify.simulation.trajectory import Trajectory
 
@@ -206,12 +196,12 @@ def plot_run(
     2
     """
     width, height = DOUBLE_COLUMN if wide else SINGLE_COLUMN
-    run = trajectory_of(subject)
+    sizes, run = current_sizes(), trajectory_of(subject)
     if run.sliding is None or not run.sliding.sigma0.any():
-        figure = Figure((width, height), layout="constrained")
+        figure = Figure(sizes.of((width, height)), layout="constrained")
         plot_trajectory(subject, ax=new_axes(figure), time_unit=time_unit)
         return figure
-    figure = Figure((width, 1.8 * height), layout="constrained")
+    figure = Figure(sizes.of((width, 1.8 * height)), layout="constrained")
     upper = new_axes(figure, (2, 1, 1))
     lower = new_axes(figure, (2, 1, 2))
     plot_trajectory(run, ax=upper, time_unit=time_unit)
