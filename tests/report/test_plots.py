@@ -980,6 +980,14 @@ def test_names_of_any_script_lie_right_of_the_axis() -> None:
             assert min(Text.get_window_extent(text).x0 for text in ax.texts) > edge, (name, plot)
 
 
+def test_names_beside_axes_that_have_their_place_lie_right_of_the_axis_too() -> None:
+    for name in ("fig3b", "sliding", "wide"):
+        for ax, plot in zip(Figure((8, 7)).subplots(2, 2).ravel(), (plot_trajectory, plot_input), strict=False):
+            drawn(plot(certified(name), ax=ax))
+            inside = [Text.get_window_extent(text) for text in ax.texts if text is not peak_of(ax)]
+            assert min(box.x0 for box in inside) > ax.get_window_extent().x0, (name, plot)
+
+
 def test_ticks_leave_a_power_of_ten_to_the_label_of_the_axis() -> None:
     ax = gallery()["wide plot_trajectory"].axes[0]
     assert ax.get_ylabel() == "state $x_k$ / $10^{12}$"

@@ -190,7 +190,7 @@ def name_agents(
         apart = len({height for height, *_ in texts[-1]}) > 1
         return texts if told or apart else texts[:1]  # not where all end at the same place
 
-    wide, room = _rooms(ax, (last - first) / ((min(last, _deadline(run)) - first) or 1))
+    wide, room, inside = _rooms(ax, (last - first) / ((min(last, _deadline(run)) - first) or 1))
     texts = columns_of([NAME_LENGTH + 8] * (1 + ends))
     needs = [max(text_width(name) for _, _, name, _ in column) for column in texts]
     if (free := room - NAME_GAP * len(needs)) < sum(needs):
@@ -212,7 +212,7 @@ def name_agents(
             start, moved = ((first, last)[side > 0], height), (side * 8, place)
             ax.annotate(name, start, moved, textcoords=("offset points", "data"), **style)
     rooms = [NAME_GAP + 1.1 * max(text_width(name) for _, _, name, _ in column) for column in texts]
-    own = max(wide - sum(rooms), wide / 3)
+    own = max(wide - rooms[0] - inside * sum(rooms[1:]), wide / 3)
     left = (last - first) * rooms[0] / own
     ticks = MaxNLocator(min(tick_count(ax.xaxis, 5), max(2, int(own / TICK_ROOM))), steps=STEPS).tick_values(
         first, last
@@ -236,20 +236,21 @@ def _seen_until(run: Trajectory | AgentsTrajectory, values: np.ndarray) -> float
     return min(last, AFTER * T) if calm else last
 
 
-def _rooms(ax: Axes, shown: float) -> tuple[float, float]:
-    """Return the width of axes with names on both sides, in points, and how much of it names may take.
+def _rooms(ax: Axes, shown: float) -> tuple[float, float, float]:
+    """Return the width of axes in points, how much of it names may take, and the share in it of names behind the lines.
 
-    The time that is ``shown`` is given in units of that up to ``T``.
+    The time that is ``shown`` is given in units of that up to ``T``. Axes that have a fixed place have room for names
+    behind the lines on their right.
     """
     points = 72 / ax.figure.dpi
-    box, spec = ax.get_window_extent(), ax.get_subplotspec()
-    panel = ax.figure.bbox.width * points
-    if spec is None or ax.figure.get_layout_engine() is None:  # type: ignore[union-attr]
-        wide = (ax.figure.bbox.x1 - box.x0) * points if spec is not None else box.width * points
+    spec = ax.get_subplotspec()
+    if fixed := spec is None or ax.figure.figure.get_layout_engine() is None:  # type: ignore[union-attr]
+        wide = ax.get_window_extent().width * points
+        panel = wide + 2 * AXIS_ROOM
     else:
-        panel *= len(spec.colspan) / spec.get_gridspec().ncols
+        panel = ax.figure.bbox.width * points * len(spec.colspan) / spec.get_gridspec().ncols
         wide = panel - AXIS_ROOM
-    return wide, max(wide - TIME_SHARE * panel * shown, 0)
+    return wide, max(wide + AXIS_ROOM * fixed - TIME_SHARE * panel * shown, 0), 1.0 - fixed
 
 
 def _spread(
