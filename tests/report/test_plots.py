@@ -988,6 +988,18 @@ def test_names_beside_axes_that_have_their_place_lie_right_of_the_axis_too() -> 
             assert min(box.x0 for box in inside) > ax.get_window_extent().x0, (name, plot)
 
 
+def test_names_at_the_end_stand_where_lines_end_in_the_figure() -> None:
+    """Leaders move on after ``T``, to half of it more, which is not all shown."""
+    cert = certify_words(CHAIN, NominalProtocol(1, 1, 2, 1), [1, 3, -2, 4], method="perron", **MOVING["leaders"])
+    run, ax = cert.asked_trajectory, drawn(plot_trajectory(cert))
+    assert run is not None and run.t[-1] > ax.get_xlim()[1] > 1
+    ends = [text for text in ax.texts if text.xy[0] > 0]  # type: ignore[attr-defined]
+    assert ends
+    for text in ends:
+        at = [np.interp(ax.get_xlim()[1], run.t, run.states[list(cert.graph.labels).index(k)]) for k in "abcd"]
+        assert min(abs(text.xy[1] - x) for x in at) < 0.05  # type: ignore[attr-defined]
+
+
 def test_ticks_leave_a_power_of_ten_to_the_label_of_the_axis() -> None:
     ax = gallery()["wide plot_trajectory"].axes[0]
     assert ax.get_ylabel() == "state $x_k$ / $10^{12}$"

@@ -32,11 +32,13 @@ CAMP_STYLES: dict[str, tuple[str, Any]] = {
 LINE_AGENTS, NAMED_AGENTS, NAMED_OF_PART = 60, 8, 3
 #: Size in points of names, and columns of a name; points that the label of a tick takes.
 NAME_SIZE, NAME_LENGTH, TICK_ROOM = 7, 18, 24
+#: Columns below which no name is broken to stand at both ends.
+SHORT = 6
 #: The least share of the width of a panel for the time up to ``T``; points beside it for the axis and its label, and
 #: between a line and its name.
 TIME_SHARE, AXIS_ROOM, NAME_GAP = 0.55, 34, 10
-#: How far beyond ``T`` a figure goes if nothing changes by more than such a share there.
-AFTER, CALM = 1.1, 0.01
+#: How far beyond ``T`` a figure goes, and how far if nothing changes by more than such a share there.
+LATEST, AFTER, CALM = 1.25, 1.1, 0.01
 #: What keeps a name legible upon lines.
 HALO = [patheffects.withStroke(linewidth=2, foreground="white")]
 
@@ -180,13 +182,14 @@ def name_agents(
     first, last = float(run.t[0]), _seen_until(run, values) if until is None else until
     agents, colours = np.array(list(lines)), list(lines.values())
     names = [shorten_text(printable(run.labels[v]), NAME_LENGTH) for v in agents]
+    at_end = values[agents, np.searchsorted(run.t, last * (1 + 1e-12), side="right") - 1]
     digits = 2 - math.floor(math.log10(float(np.abs(np.nan_to_num(values)).max()) or 1.0))  # a run's 1e-9 is 0
-    tails = [f": {round(float(x), digits) + 0.0:.3g}" if told else "" for x in values[agents, -1]]
+    tails = [f": {round(float(x), digits) + 0.0:.3g}" if told else "" for x in at_end]
 
     def columns_of(letters: Sequence[int]) -> list[list[tuple[float, float, str, str]]]:
         texts = [_spread(ax, values[agents, 0], names, colours, letters[0])]
         if len(letters) > 1:
-            texts.append(_spread(ax, values[agents, -1], names, colours, letters[1], tails))
+            texts.append(_spread(ax, at_end, names, colours, letters[1], tails))
         apart = len({height for height, *_ in texts[-1]}) > 1
         return texts if told or apart else texts[:1]  # not where all end at the same place
 
@@ -196,7 +199,8 @@ def name_agents(
     if (free := room - NAME_GAP * len(needs)) < sum(needs):
         right = [min(needs[1], max(free / 2, free - needs[0]))] if len(needs) > 1 else []
         letters = [max(3, int(part / text_width("x"))) for part in (free - sum(right), *right)]
-        if len(letters) > 1 and not told and max(map(columns, names)) > 2 * min(letters):
+        longest = max(map(columns, names))
+        if len(letters) > 1 and not told and min(letters) < max(longest / 2, min(longest, SHORT)):
             letters = [max(3, int((room - NAME_GAP) / text_width("x")))]
         texts = columns_of(letters)
     for side, column in zip((-1, 1), texts, strict=False):
@@ -233,7 +237,7 @@ def _seen_until(run: Trajectory | AgentsTrajectory, values: np.ndarray) -> float
     T, last = _deadline(run), float(run.t[-1])
     after = np.nan_to_num(values[:, run.t > T])
     calm = not after.size or np.ptp(after, axis=1).max() <= CALM * np.ptp(np.nan_to_num(values))
-    return min(last, AFTER * T) if calm else last
+    return min(last, (AFTER if calm else LATEST) * T)
 
 
 def _rooms(ax: Axes, shown: float) -> tuple[float, float, float]:
