@@ -966,7 +966,7 @@ def test_names_leave_more_than_half_of_the_width_to_the_time_up_to_the_deadline(
         whole = ax.figure.figure if ax.get_subplotspec() is None else ax.figure
         FigureCanvasAgg(ax.figure.figure).draw()  # type: ignore[union-attr]
         begin, end = ax.transData.transform([[0, 0], [1, 0]])[:, 0]
-        assert end - begin >= (TIME_SHARE - 0.03) * whole.bbox.width  # the room of the axis is an estimate
+        assert end - begin >= TIME_SHARE * whole.bbox.width
         for text in ax.texts:
             assert all(len(line) <= NAME_LENGTH + 9 for line in text.get_text().split("\n"))
 

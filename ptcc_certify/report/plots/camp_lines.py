@@ -32,13 +32,13 @@ CAMP_STYLES: dict[str, tuple[str, Any]] = {
 LINE_AGENTS, NAMED_AGENTS, NAMED_OF_PART = 60, 8, 3
 #: Size in points of names, and columns of a name; points that the label of a tick takes.
 NAME_SIZE, NAME_LENGTH, TICK_ROOM = 7, 18, 24
-#: Columns below which no name is broken to stand at both ends.
-SHORT = 6
+#: Columns below which no name is broken to stand at both ends; how much wider than others letters may be.
+SHORT, WIDER = 6, 1.1
 #: The least share of the width of a panel for the time up to ``T``; points beside it for the axis and its label, and
 #: between a line and its name.
-TIME_SHARE, AXIS_ROOM, NAME_GAP = 0.55, 34, 10
+TIME_SHARE, AXIS_ROOM, NAME_GAP = 0.55, 40, 10
 #: How far beyond ``T`` a figure goes, and how far if nothing changes by more than such a share there.
-LATEST, AFTER, CALM = 1.25, 1.1, 0.01
+LATEST, AFTER, CALM = 1.2, 1.1, 0.01
 #: What keeps a name legible upon lines.
 HALO = [patheffects.withStroke(linewidth=2, foreground="white")]
 
@@ -196,12 +196,12 @@ def name_agents(
     wide, room, inside = _rooms(ax, (last - first) / ((min(last, _deadline(run)) - first) or 1))
     texts = columns_of([NAME_LENGTH + 8] * (1 + ends))
     needs = [max(text_width(name) for _, _, name, _ in column) for column in texts]
-    if (free := room - NAME_GAP * len(needs)) < sum(needs):
+    if (free := (room - NAME_GAP * len(needs)) / WIDER) < sum(needs):
         right = [min(needs[1], max(free / 2, free - needs[0]))] if len(needs) > 1 else []
         letters = [max(3, int(part / text_width("x"))) for part in (free - sum(right), *right)]
         longest = max(map(columns, names))
         if len(letters) > 1 and not told and min(letters) < max(longest / 2, min(longest, SHORT)):
-            letters = [max(3, int((room - NAME_GAP) / text_width("x")))]
+            letters = [max(3, int((room - NAME_GAP) / WIDER / text_width("x")))]
         texts = columns_of(letters)
     for side, column in zip((-1, 1), texts, strict=False):
         for height, place, name, colour in column:
@@ -215,7 +215,7 @@ def name_agents(
             style["path_effects"] = HALO
             start, moved = ((first, last)[side > 0], height), (side * 8, place)
             ax.annotate(name, start, moved, textcoords=("offset points", "data"), **style)
-    rooms = [NAME_GAP + 1.1 * max(text_width(name) for _, _, name, _ in column) for column in texts]
+    rooms = [NAME_GAP + WIDER * max(text_width(name) for _, _, name, _ in column) for column in texts]
     own = max(wide - rooms[0] - inside * sum(rooms[1:]), wide / 3)
     left = (last - first) * rooms[0] / own
     ticks = MaxNLocator(min(tick_count(ax.xaxis, 5), max(2, int(own / TICK_ROOM))), steps=STEPS).tick_values(
