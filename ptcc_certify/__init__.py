@@ -24,7 +24,7 @@ The names at the top, by topic:
 - Figures: ``plot_glance``, ``animate``, ``plot_influence``, ``plot_trajectory``, ``plot_decay``, ``plot_run``,
   ``plot_sliding``, ``plot_trade_off``, ``plot_input``, ``plot_effort``, ``plot_graph``, ``plot_spectrum``,
   ``plot_frontier``, ``plot_motion``, ``plot_formation``, ``plot_tracking``, ``save_figure``, ``SINGLE_COLUMN``,
-  ``DOUBLE_COLUMN``
+  ``DOUBLE_COLUMN``, ``figures_for``
 - Reports: ``write_report``, ``explore``, ``cite``
 - Errors: ``PTCCError``
 
@@ -117,8 +117,9 @@ _EXPORTS = {
     "plot_frontier": "report.plots.spectrum",
     "plot_tracking": "report.plots.tracking",
     "save_figure": "report.plots.style",
-    "SINGLE_COLUMN": "report.plots.style",
-    "DOUBLE_COLUMN": "report.plots.style",
+    "SINGLE_COLUMN": "report.plots.sizes",
+    "DOUBLE_COLUMN": "report.plots.sizes",
+    "figures_for": "report.plots.sizes",
     # Reports
     "write_report": "report.report_file",
     "explore": "report.explorer",

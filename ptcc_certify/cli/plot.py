@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from ptcc_certify.simulation.trajectory import Trajectory
 
 #: Options that a certificate takes; the others are for graphs.
-_OF_CERTIFICATES = ("graph", "what", "output", "wide", "time_unit", "memory", "x0", "seed")
+_SIZES = ("purpose", "width", "state_unit")
+_OF_CERTIFICATES = ("graph", "what", "output", "wide", "time_unit", *_SIZES, "memory", "x0", "seed")
 #: Figures of a simulated run.
 OF_A_RUN = ("states", "input", "decay")
 #: Figures of agents of order n; and which they share with others.
@@ -78,7 +79,19 @@ class _Figure(click.Choice):  # type: ignore[type-arg]  # no generic class befor
     help="FILE.png, .pdf or .svg.  [default: NAME-WHAT.png]",
 )
 @click.option("--wide", is_flag=True, help="As wide as two columns of a journal (states).")
+@click.option(
+    "--for",
+    "purpose",
+    type=click.Choice(["ieee", "nature", "slide"]),
+    default="ieee",
+    help="Sizes of figure and text: columns of a journal of the IEEE, 3.5 or 7.16 inches, or of Nature, 89 or 183 mm; "
+    "a slide of 16 to 9.",
+)
+@click.option(
+    "--width", type=click.FloatRange(0.5, 100), metavar="INCHES", help="Of the figure, in place of that of a column."
+)
 @shared.time_unit_option
+@click.option("--state-unit", metavar="UNIT", default="", show_default=False, help="Of states on axes, such as m.")
 @shared.reading_options
 @families.mode_options
 @shared.protocol_options
@@ -131,9 +144,11 @@ def plot(
         refuse_output(output)
     with progress(("figure",)) as begin:
         begin("figure")
+        from ptcc_certify.report.plots.sizes import figures_for
         from ptcc_certify.report.plots.style import save_figure
 
-        save_figure(_draw(what, subject, wide, time_unit), output)
+        with figures_for(options["purpose"], width=options["width"], state_unit=options["state_unit"]):
+            save_figure(_draw(what, subject, wide, time_unit), output)
     print_lines(f"written    {output}")
     return ExitCode.OK
 

@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 
 from ptcc_certify.report.example_results import Run
 from ptcc_certify.report.page_figures import PLOTS
-from ptcc_certify.report.plots.style import DOUBLE_COLUMN, SINGLE_COLUMN, STYLE, new_axes, share_legend
+from ptcc_certify.report.plots.sizes import DOUBLE_COLUMN, SINGLE_COLUMN
+from ptcc_certify.report.plots.style import STYLE, new_axes, share_legend
 
 #: The plots of those figures of the paper that have a name of their own.
 _PLOTS = {"graphs": "graph", "sliding_variables": "sliding"}
@@ -56,7 +57,8 @@ def _panels(runs: Sequence[Run], what: str) -> Figure:
         figure = Figure((width, height), layout="constrained")
         for place, (example, graph, certificate) in enumerate(runs, start=1):
             ax = new_axes(figure, (1, len(runs), place))
-            PLOTS[_PLOTS.get(what, what)](certificate, ax=ax)
+            others = {"beside": [run.certificate for run in runs]} if what == "input" else {}
+            PLOTS[_PLOTS.get(what, what)](certificate, ax=ax, **others)
             claim = certificate.graph_proof.claim
             ax.set_title(f"({'ab'[example.graphs.index(graph)]}) {graph}: {claim.behaviour if claim else ''}")
         return share_legend(figure, 2 * len(runs) + 1)

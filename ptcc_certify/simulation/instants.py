@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 #: How far a run goes past the deadline unless told otherwise, as a share of it.
 PAST = 0.25
-_PAST_SAMPLES = 5
+#: Samples past the deadline, where nothing drives the agents; where something does, for 40 in a tenth of ``T``.
+_PAST_SAMPLES, _DRIVEN_SAMPLES = 5, 100
 #: Steps of a run in steps of closed form at most; a step as a share of what is left until ``T``, at most.
 MOST_STEPS, STEP_SHARE = 20_000, 0.02
 # 1 - t/T at 0.5 T, 0.9 T, 0.99 T.
@@ -50,8 +51,12 @@ def steps_towards(T: float, longest: float, share: float, nearest: float) -> np.
     return np.array([*left[:-1], T])[::-1]
 
 
-def default_instants(protocol: Protocol, remaining: float, samples: int, past: float) -> Instants:
+def default_instants(
+    protocol: Protocol, remaining: float, samples: int, past: float, *, driven: bool = False
+) -> Instants:
     """Return instants dense towards ``T_r``, if there is one, and towards ``T``, and evenly in time.
+
+    Past ``T`` they are denser where agents are ``driven``, by a disturbance that may oscillate.
 
     Raises
     ------
@@ -73,7 +78,8 @@ def default_instants(protocol: Protocol, remaining: float, samples: int, past: f
     shares = np.append(shares, [share for share in _MARKS if share < T_s / T])
     between = np.stack([T * (1 - shares), shares, np.zeros(shares.size)])
     between[0, shares == T_s / T] = T_r
-    later = T * (1 + past * np.arange(_PAST_SAMPLES + 1 if past else 1) / _PAST_SAMPLES)
+    steps = math.ceil(_DRIVEN_SAMPLES * max(past / PAST, 1)) if driven else _PAST_SAMPLES
+    later = T * (1 + past * np.arange(steps + 1 if past else 1) / steps)
     parts = [between, np.stack([later, np.zeros(later.size), np.zeros(later.size)])]
     if T_r:
         marks = np.array([T * (1 - share) for share in _MARKS])

@@ -207,7 +207,8 @@ def simulate(
     if actuator is not None and not isinstance(actuator, GainLimits):
         raise ParameterError("actuator", f"= {shorten(repr(actuator))} is none; give GainLimits(gain_cap=50), say")
     if how["times"] is None:
-        instants = default_instants(protocol, how["remaining"], how["samples"], how["past"])
+        driven = protocol.reaching is not None or disturbance is not None or how["noise"] is not None
+        instants = default_instants(protocol, how["remaining"], how["samples"], how["past"], driven=driven)
     else:
         instants = wanted_instants(protocol, how["times"])
     played = ConstantSignal() if family is None else as_signal("random" if signal is None else signal)

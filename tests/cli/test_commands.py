@@ -289,6 +289,9 @@ def test_every_figure_of_a_certificate_a_graph_and_a_scenario_is_drawn(certifica
     for what in ("states", "graph"):
         assert ptcc("plot", "team.csv", "--what", what, "--x0", "1,2,3,4").out == f"written    team-{what}.png\n"
     assert ptcc("plot", "s.toml").code == 0 and Path("team-graph.png").exists()
+    words = ("--for", "slide", "--width", "10", "--state-unit", "m", "-o", "slide.svg")
+    assert ptcc("plot", certificate, "--what", "states", *words).out == "written    slide.svg\n"
+    assert 'width="720.000000pt" height="405.000000pt"' in Path("slide.svg").read_text()
 
 
 def test_a_certificate_without_an_initial_state_is_drawn_from_the_one_that_is_given(certificate: str):

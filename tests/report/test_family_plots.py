@@ -160,9 +160,11 @@ def test_states_are_drawn_where_no_limit_is_claimed():
     certificate = certify_family(DECIDED["edge"], PROTOCOL, [1, 2, 3])
     runs = sample_runs(certificate, [RandomSignal(1)])
     assert not plot_trajectory(certificate, runs=runs).collections
-    plot_input(certificate, runs=runs)
-    with pytest.raises(ParameterError, match="no proved bound"):
-        plot_decay(certificate, runs=runs)
+    for plot in (plot_input, plot_decay):
+        legend = plot(certificate, runs=runs).get_legend()
+        assert "proved for every signal" not in {text.get_text() for text in legend.get_texts()}
+        title = " ".join(legend.get_title().get_text().split())
+        assert title.endswith("no bound exists for all states and signals: the behaviour depends on the signal")
 
 
 def test_states_come_first_where_no_bound_of_a_decay_is_proved():

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import inspect
 import math
+import re
+import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -14,10 +16,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from asked import certify_words
+from asked import certify_family, certify_words
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import same_color
+from matplotlib.colors import same_color, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch, Polygon
@@ -47,14 +49,26 @@ from ptcc_certify.model.nominal import NominalProtocol
 from ptcc_certify.model.sliding_mode import SlidingModeProtocol
 from ptcc_certify.report.notebook import trajectory_html
 from ptcc_certify.report.page import report_html
-from ptcc_certify.report.plots.camp_lines import CAMP_STYLES, NAME_SIZE, NAMED_AGENTS, NAMED_OF_PART
+from ptcc_certify.report.plots.camp_lines import (
+    CAMP_STYLES,
+    LINE_AGENTS,
+    NAME_LENGTH,
+    NAME_SIZE,
+    NAMED_AGENTS,
+    NAMED_OF_PART,
+    TIME_SHARE,
+)
+from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.decay import plot_decay
-from ptcc_certify.report.plots.distributions import plot_final_states
+from ptcc_certify.report.plots.distributions import plot_degrees, plot_final_states
+from ptcc_certify.report.plots.glance import plot_glance
 from ptcc_certify.report.plots.graph import GROUND, plot_graph, weight_ranges
 from ptcc_certify.report.plots.graph_layout import FREE_NODES, arc
 from ptcc_certify.report.plots.input import plot_effort, plot_input
+from ptcc_certify.report.plots.motion import plot_formation, plot_motion
+from ptcc_certify.report.plots.sizes import DOUBLE_COLUMN, SINGLE_COLUMN, figures_for
 from ptcc_certify.report.plots.spectrum import CLASS_MARKERS, plot_frontier, plot_spectrum
-from ptcc_certify.report.plots.style import DOUBLE_COLUMN, EDGE_STYLES, SINGLE_COLUMN, STYLE, save_figure
+from ptcc_certify.report.plots.style import EDGE_STYLES, STYLE, save_figure
 from ptcc_certify.report.plots.tracking import plot_tracking
 from ptcc_certify.report.plots.trade_off import plot_trade_off
 from ptcc_certify.report.plots.trajectory import plot_run, plot_sliding, plot_trajectory
@@ -136,7 +150,7 @@ def camps(structure: Structure) -> list[str]:
 def shows(drawn: np.ndarray, row: np.ndarray, scale: float) -> bool:
     """Whether a line is that of an agent; gaps, where nothing is resolved, hide nothing that is large at the start."""
     gaps = np.isnan(drawn)
-    return np.array_equal(drawn[~gaps], row[~gaps]) and not (gaps[0] and row[0] > 1e-6 * scale)
+    return np.array_equal(drawn[~gaps], row[~gaps]) and not (gaps[0] and abs(row[0]) > 1e-6 * scale)
 
 
 # ---------------------------------------------------------------------- agents over time
@@ -160,7 +174,7 @@ def test_each_of_few_agents_has_a_line_of_its_camp_and_its_name(name: str) -> No
     run = cert.trajectory
     assert run is not None and cert.graph.n_nodes <= NAMED_AGENTS
     states, ax = drawn(plot_trajectory(cert)), drawn(plot_input(cert))
-    for values, axes in ((run.states, states), (np.abs(run.input), ax)):
+    for values, axes in ((run.states, states), (run.input, ax)):
         scale = np.abs(values[:, :1]).max()
         assert len(agent_lines(axes)) == cert.graph.n_nodes
         for row, camp in zip(values, camps(cert.structure), strict=True):
@@ -174,24 +188,38 @@ def test_each_of_few_agents_has_a_line_of_its_camp_and_its_name(name: str) -> No
     if text is not None and peak is not None:
         assert float(text.get_text().split()[2].strip(",")) >= peak.largest >= np.abs(run.input).max() * (1 - 1e-9)
         assert text.xy[1] == float(peak.largest) < ax.get_ylim()[1] or text.get_text().endswith("above")
+        lines = {height for line in ax.lines for height in line.get_ydata() if abs(height) == float(peak.largest)}
+        assert len(lines) == (0 if text.get_text().endswith("above") else 2)  # above and below
 
 
-def test_of_many_agents_the_parts_are_drawn_and_few_agents_named() -> None:
+def test_up_to_60_agents_have_lines_and_those_that_begin_highest_and_lowest_their_names() -> None:
     cert = certified("fig5b")
     run, group = cert.trajectory, np.array(camps(cert.structure))
-    assert run is not None and cert.graph.n_nodes > NAMED_AGENTS
-    for ax, values, middle in (
-        (plot_trajectory(cert), run.states, np.median),
-        (plot_input(cert), np.abs(run.input), np.max),
-    ):
-        shown = labelled(drawn(ax))
-        for part in set(group):
-            rows = values[group == part]
-            assert len(rows) > NAMED_OF_PART
-            line = next(handle for label, handle in shown.items() if label.startswith(part))
-            seen = np.asarray(line.get_ydata())  # type: ignore[attr-defined]
-            assert seen[:50] == pytest.approx(middle(rows, axis=0)[:50])
-        assert len(agent_lines(ax)) <= 2 * len(set(group)) and 2 <= len(ax.texts) <= 9
+    assert run is not None and NAMED_AGENTS < cert.graph.n_nodes <= LINE_AGENTS
+    ax = drawn(plot_trajectory(cert))
+    lines = {line.get_ydata().tobytes(): line for line in agent_lines(ax)}
+    for row, part in zip(run.states, group, strict=True):
+        assert same_color(lines[row.tobytes()].get_color(), CAMP_STYLES[part][0])
+    written = ", ".join(text.get_text() for text in ax.texts)
+    for part in set(group):
+        own = np.flatnonzero(group == part)
+        assert len(own) > NAMED_OF_PART
+        for end in (own[run.states[own, 0].argmin()], own[run.states[own, 0].argmax()]):
+            assert cert.graph.labels[end] in written.split(", ")
+
+
+@pytest.mark.few(0)
+def test_of_more_than_60_agents_the_parts_are_drawn_as_their_range_and_mean() -> None:
+    ring = SignedDigraph.from_edges([(k, (k + 1) % 64, -1 if k in (5, 30) else 1) for k in range(64)])
+    run = simulate(ring, PROTOCOL, [float(k * (-1) ** k) for k in range(64)])
+    ax, group = drawn(plot_trajectory(run)), np.array(camps(analyse(ring)))
+    for part in ("first camp", "second camp"):
+        rows = run.states[group == part]
+        assert labelled(ax)[part].get_ydata() == pytest.approx(rows.mean(axis=0))  # type: ignore[attr-defined]
+        (shade,) = [one for one in ax.collections if same_color(one.get_facecolor()[0][:3], CAMP_STYLES[part][0])]
+        inside = shade.get_paths()[0].vertices  # type: ignore[union-attr]
+        assert [inside[:, 1].min(), inside[:, 1].max()] == pytest.approx([rows.min(), rows.max()])
+    assert len(agent_lines(ax)) == 4 and len(ax.texts) >= 4
 
 
 @pytest.mark.few(0)
@@ -246,7 +274,7 @@ def test_of_a_certificate_under_limits_the_run_under_them_is_drawn_and_they_are_
         legend = ax.get_legend()
         assert legend is not None and cert.trajectory is not None
         titles[name] = legend.get_title().get_text()
-        first = np.nanmax([line.get_ydata()[0] for line in agent_lines(ax)])  # type: ignore[index]
+        first = np.nanmax([abs(line.get_ydata()[0]) for line in agent_lines(ax)])  # type: ignore[index]
         for other in (plot_trajectory(cert), plot_decay(cert)):
             assert other.get_legend().get_title().get_text() == titles[name]  # type: ignore[union-attr]
         ideal = np.abs(cert.trajectory.input[:, 0]).max()
@@ -291,7 +319,7 @@ def test_inputs_of_agents_of_order_n_are_drawn_below_their_proved_peak(agents: A
     ax, run = drawn(cert.plot("input")), cert.agents.simulate()
     peak = peak_of(ax)
     assert peak is not None and float(peak.get_text().split()[2].rstrip(",")) >= max(cert.agents.input)
-    highest = max(np.nanmax(line.get_ydata()) for line in agent_lines(ax))  # type: ignore[type-var]
+    highest = max(np.nanmax(np.abs(line.get_ydata())) for line in agent_lines(ax))  # type: ignore[arg-type]
     assert highest == pytest.approx(np.nanmax(np.linalg.norm(run.input, axis=1)), rel=1e-6)
     assert highest <= max(cert.agents.input)
 
@@ -323,9 +351,9 @@ def test_an_input_without_bound_is_drawn_with_its_start() -> None:
     cert = certify(pair, slow, [1, -1])
     assert cert.trajectory is not None
     ax = drawn(plot_input(cert))
-    size = np.abs(cert.trajectory.input)
-    assert ax.get_ylim()[0] < size[:, 0].min() < 1e-3 * size.max() < size.max() < ax.get_ylim()[1]
-    assert ax.get_yscale() == "log" and peak_of(ax) is None
+    u = cert.trajectory.input
+    assert ax.get_ylim()[0] < u.min() < 1e3 * u[:, 0].min() < 1e3 * u[:, 0].max() < u.max() < ax.get_ylim()[1]
+    assert ax.get_yscale() == "symlog" and peak_of(ax) is None
 
 
 @pytest.mark.few(0)
@@ -345,7 +373,7 @@ def test_the_input_of_the_sliding_mode() -> None:
     assert run.sliding is not None
     late = run.t > float(run.protocol.T)  # there the input answers the disturbance alone
     answers = {line.get_ydata()[late].round(6).tobytes() for line in agent_lines(ax)}
-    assert answers == {row.round(6).tobytes() for row in np.abs(run.sliding.disturbance[:, late])}
+    assert answers == {(0.0 - row).round(6).tobytes() for row in run.sliding.disturbance[:, late]}
     other = certify(graph, example.protocol(), InitialState(start, sigma0=[1.0] * 6), asks=Asks(simulation=False))
     with pytest.raises(ValueError, match=r"another sigma\(0\) than"):
         plot_input(cert.trajectory, certificate=other)
@@ -533,7 +561,7 @@ def test_short_labels_of_40_agents_stand_in_their_nodes() -> None:
 
 @pytest.mark.few(0)
 def test_the_axis_of_an_input_that_is_large_for_a_short_time_alone_is_logarithmic() -> None:
-    for name, scale in (("fig1a", "log"), ("fig3a", "linear")):
+    for name, scale in (("fig1a", "symlog"), ("fig3a", "linear")):
         example, _, _ = select(name)[name == "fig1a"]
         sigma0 = example.sigma0 and example.sigma0.split(",")
         cert = certify(
@@ -548,6 +576,46 @@ def test_the_axis_of_an_input_that_is_large_for_a_short_time_alone_is_logarithmi
         assert ("$T_r$" in labelled(end)) == (example.sigma0 is not None)
         if example.sigma0 is not None:
             assert labelled(end)["$T_r$"].get_xdata()[0] == pytest.approx(float(example.protocol().reaching.T_r))  # type: ignore[attr-defined,union-attr]
+
+
+@pytest.mark.few(0)
+def test_what_is_small_at_the_deadline_is_drawn_on_the_axis_of_remaining_time() -> None:
+    protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
+    for name, asked in MOVING.items():
+        cert = certify_words(CHAIN, protocol, [1, 3, -2, 4], method="perron", simulation=False, **asked)
+        assert cert.late is not None
+        times = np.array([0, 0.5, 1 - 1e-6, 1, 1.5 if cert.late.tracks else 1])
+        bound = cert.late.largest_bound(times)
+        small = bool(bound[-2:].max() < bound[0] / 100)
+        ax, over_time = drawn(plot_tracking(cert)), drawn(plot_tracking(cert, axis="time"))
+        assert ax.get_xlabel().startswith("remaining time" if small else "time"), (name, bound)
+        assert over_time.get_xlabel() == "time $t$" and over_time.get_xscale() == "linear"
+        left = drawn(plot_tracking(cert, axis="left"))
+        q, values = labelled(left)["proved bound"].get_data()  # type: ignore[attr-defined]
+        assert np.interp([1 - t for t in times[:3]], q[::-1], values[::-1]) == pytest.approx(bound[:3], rel=1e-3)
+        assert left.get_xlim()[0] == 1 > left.get_xlim()[1] > 0 and (values[q >= left.get_xlim()[1]] > 0).all()
+    with pytest.raises(ParameterError, match="unknown; one of left, time"):
+        plot_tracking(cert, axis="clock")  # type: ignore[arg-type]
+
+
+@pytest.mark.few(0)
+def test_what_oscillates_after_the_deadline_is_drawn_with_40_samples_a_period() -> None:
+    run, graph = certified("sliding").trajectory, graph_of("fig3b")
+    assert run is not None and "sin(2*k*t" in str(EXAMPLES[5].disturbance)
+    shaken = simulate(graph, PROTOCOL, range(6), disturbance=Bounded("sin(k*9*t)", 1), actuator=GainLimits(gain_cap=9))
+    for t, deadline, period in ((run.t, 1.5, math.pi / graph.n_nodes), (shaken.t, 1, 2 * math.pi / 54)):
+        assert (np.diff(t[t >= deadline]) <= period / 40).all()
+
+
+@pytest.mark.few(0)
+def test_inputs_of_two_panels_have_one_axis() -> None:
+    steep, flat = certified("sliding"), certified("fig3b")
+    left, right = Figure().subplots(1, 2)
+    for ax, cert in ((left, steep), (right, flat)):
+        drawn(plot_input(cert, ax=ax, beside=[steep, flat]))
+    assert left.get_ylim() == right.get_ylim() and left.get_yscale() == right.get_yscale() == "symlog"
+    assert list(left.get_yticks()) == list(right.get_yticks()) and 0 in left.get_yticks()
+    assert plot_input(flat).get_yscale() == "linear"
 
 
 def test_the_bound_of_a_disconnected_graph_is_named_by_the_theorems_of_its_components() -> None:
@@ -816,6 +884,93 @@ def test_no_text_of_a_figure_overlaps_another_or_leaves_the_figure_or_is_small()
             assert width < 1 or height < 2, (name, text.get_text(), other.get_text())
 
 
+@cache
+def further() -> list[Figure]:
+    """Figures of every other kind: of families, of agents of order n, of many agents, at a glance."""
+    day = ptcc_certify.as_family([("ann", "bob", 1, 2), ("bob", "eve", -1, -1)])
+    night = SignedDigraph.from_edges([("ann", "bob", 1), ("bob", "eve", -2)])
+    family = certify_family(Family.switching({"day": day, "night": night}), PROTOCOL, [1, 4, -3])
+    depends = certify_family(ptcc_certify.as_family([("a", "b", 1, 1), ("b", "a", -1, 0)]), PROTOCOL, [1, 4])
+    asked: dict[str, Any] = {"agents": ptcc_certify.Agents(order=2), "asks": Asks(method="paper", simulation=False)}
+    plane = certify(CHAIN, PROTOCOL, [[k, 2 - k] for k in range(4)], **asked)
+    parts = depends.family_proof.parts
+    drawn = [plot_graph(family), plot_trajectory(family), plot_decay(family), plot_input(family)]
+    drawn += [plot_counterexample(parts[0].component), plot_final_states(certified("fig5b")), plot_formation(plane)]
+    drawn += [plot_degrees(CHAIN), plot_motion(plane), *map(plot_glance, (family, plane, certified("fig3b")))]
+    return [one.figure for one in drawn]
+
+
+def light(colour: Any) -> np.ndarray:
+    """Red, green and blue as light, without the gamma of sRGB."""
+    rgb = np.array(to_rgb(colour))
+    return np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+
+
+def contrast(colour: Any) -> float:
+    """The contrast to white by WCAG 2."""
+    return float(1.05 / (light(colour) @ [0.2126, 0.7152, 0.0722] + 0.05))
+
+
+@pytest.mark.few(0)
+def test_every_text_of_every_figure_is_dark_enough_on_white_and_white_ones_stand_on_dark_nodes() -> None:
+    seen = 0
+    for figure in [*gallery().values(), *further()]:
+        for ax in figure.axes:
+            nodes = [
+                line.get_color() for line in ax.lines if line.get_marker() in ("o", "s", "D") and len(line.get_xdata())
+            ]
+            for text in (text for text in ax.texts if same_color(text.get_color(), "white")):
+                assert nodes and min(contrast(node) for node in nodes if not same_color(node, "white")) >= 4.5, text
+        colours = {text.get_color() for text in figure.findobj(Text) if text.get_text().strip()}
+        seen += len(colours)
+        assert all(contrast(colour) >= 4.5 or same_color(colour, "white") for colour in colours), colours
+    assert seen > 60
+
+
+#: What is left of light to eyes without cones of green: Machado, Oliveira and Fernandes (2009), severity 1.
+DEUTERANOPIA = np.array(
+    [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]]
+)
+
+
+def lab(rgb: np.ndarray) -> np.ndarray:
+    """CIE L*a*b* of linear light of sRGB."""
+    to_xyz = np.array(
+        [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
+    )
+    xyz = to_xyz @ np.clip(rgb, 0, 1) / [0.95047, 1, 1.08883]
+    f = np.where(xyz > 216 / 24389, np.cbrt(xyz), (24389 / 27 * xyz + 16) / 116)
+    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
+
+
+def test_camps_differ_in_their_lines_and_to_eyes_without_cones_of_green_in_their_colours() -> None:
+    """The distance is that of CIE 1976, of which about 2 is just seen; edges of either sign, and their lines, too."""
+    styles = {name: style for name, style in CAMP_STYLES.items() if name != "agents"}  # where no other part is
+    for (one, (colour, line)), (other, (second, dashes)) in combinations(styles.items(), 2):
+        for seen in (np.eye(3), DEUTERANOPIA):
+            apart = np.linalg.norm(lab(seen @ light(colour)) - lab(seen @ light(second)))
+            assert apart >= 20, (one, other, apart)
+        assert line != dashes
+    (ally, line, _), (opponent, dashes, _) = EDGE_STYLES.values()
+    assert np.linalg.norm(lab(DEUTERANOPIA @ light(ally)) - lab(DEUTERANOPIA @ light(opponent))) >= 20
+    assert line != dashes
+
+
+@pytest.mark.few(0)
+@pytest.mark.parametrize("names", ["abcd", "a very long name of somebody", "fourteen wide", "北京市朝阳区"])
+def test_names_leave_more_than_half_of_the_width_to_the_time_up_to_the_deadline(names: str) -> None:
+    labels = [f"{names[:-2]}{k} {names[-2:]}" for k in range(4)]
+    graph = SignedDigraph.from_edges([(a, b, 1) for a, b in pairwise(labels)])
+    cert = certify(graph, PROTOCOL, [1, -2, 3, 7], asks=Asks(simulation=False))
+    for ax in (plot_trajectory(cert), plot_input(cert), *plot_glance(cert).axes[1:]):
+        whole = ax.figure.figure if ax.get_subplotspec() is None else ax.figure
+        FigureCanvasAgg(ax.figure.figure).draw()  # type: ignore[union-attr]
+        begin, end = ax.transData.transform([[0, 0], [1, 0]])[:, 0]
+        assert end - begin >= TIME_SHARE * whole.bbox.width
+        for text in ax.texts:
+            assert all(len(line) <= NAME_LENGTH + 9 for line in text.get_text().split("\n"))
+
+
 @pytest.mark.few(0)
 def test_names_of_any_script_lie_right_of_the_axis() -> None:
     for name in ("wide", "fig3b", "single"):
@@ -823,6 +978,26 @@ def test_names_of_any_script_lie_right_of_the_axis() -> None:
             ax = gallery()[f"{name} {plot.__name__}"].axes[0]
             edge = ax.get_window_extent().x0
             assert min(Text.get_window_extent(text).x0 for text in ax.texts) > edge, (name, plot)
+
+
+def test_names_beside_axes_that_have_their_place_lie_right_of_the_axis_too() -> None:
+    for name in ("fig3b", "sliding", "wide"):
+        for ax, plot in zip(Figure((8, 7)).subplots(2, 2).ravel(), (plot_trajectory, plot_input), strict=False):
+            drawn(plot(certified(name), ax=ax))
+            inside = [Text.get_window_extent(text) for text in ax.texts if text is not peak_of(ax)]
+            assert min(box.x0 for box in inside) > ax.get_window_extent().x0, (name, plot)
+
+
+def test_names_at_the_end_stand_where_lines_end_in_the_figure() -> None:
+    """Leaders move on after ``T``, to half of it more, which is not all shown."""
+    cert = certify_words(CHAIN, NominalProtocol(1, 1, 2, 1), [1, 3, -2, 4], method="perron", **MOVING["leaders"])
+    run, ax = cert.asked_trajectory, drawn(plot_trajectory(cert))
+    assert run is not None and run.t[-1] > ax.get_xlim()[1] > 1
+    ends = [text for text in ax.texts if text.xy[0] > 0]  # type: ignore[attr-defined]
+    assert ends
+    for text in ends:
+        at = [np.interp(ax.get_xlim()[1], run.t, run.states[list(cert.graph.labels).index(k)]) for k in "abcd"]
+        assert min(abs(text.xy[1] - x) for x in at) < 0.05  # type: ignore[attr-defined]
 
 
 def test_ticks_leave_a_power_of_ten_to_the_label_of_the_axis() -> None:
@@ -1110,3 +1285,70 @@ def test_states_of_very_different_sizes_are_those_of_the_certificate(tmp_path: P
     leaders, limits = MovingLeaders(speed="0.355"), GainLimits(gain_cap="2.28")
     moved = certify(graph, protocol, start, leaders=leaders, limits=limits, asks=Asks(simulation=False))
     assert write_report(moved, tmp_path / "moved.html") == "certified"
+
+
+# ---------------------------------------------------------------------- journals and slides
+
+
+def saved_size(path: Path) -> tuple[float, float]:
+    """Width and height of a saved figure in inches."""
+    data = path.read_bytes()
+    if path.suffix == ".png":
+        place = data.index(b"pHYs") + 4
+        across = int.from_bytes(data[place : place + 4])  # per metre
+        return tuple(int.from_bytes(data[k : k + 4]) / across / 0.0254 for k in (16, 20))  # type: ignore[return-value]
+    size = re.search(rb"(?:MediaBox \[ 0 0 |width=\")([\d.]+)(?: |pt\" height=\")([\d.]+)", data)
+    assert size is not None
+    return float(size[1]) / 72, float(size[2]) / 72
+
+
+@pytest.mark.few(1)
+@pytest.mark.parametrize("suffix", [".png", ".pdf", ".svg"])
+@pytest.mark.parametrize(("purpose", "text"), [("ieee", 8.0), ("nature", 7.0), ("slide", 18.0)])
+def test_figures_have_the_width_and_the_text_of_what_they_are_for(
+    purpose: str, text: float, suffix: str, tmp_path: Path
+) -> None:
+    run, path = certified("fig3b").trajectory, tmp_path / f"a{suffix}"
+    with figures_for(purpose) as sizes:
+        for wide in (False, True):
+            figure = plot_run(run, wide=wide)
+            save_figure(figure, path)
+            width, height = saved_size(path)
+            assert width == pytest.approx(sizes.widths[wide], abs=2 / 300)
+            assert purpose != "slide" or height == pytest.approx(width * 9 / 16, abs=2 / 300)
+            drawn_to_saved = width / figure.get_figwidth()
+            assert figure.axes[0].xaxis.label.get_size() * drawn_to_saved == pytest.approx(text, rel=0.01)
+        if suffix == ".pdf" and purpose != "ieee":
+            streams = re.findall(rb"stream\r?\n(.*?)\r?\nendstream", path.read_bytes(), re.DOTALL)
+            (page,) = [content for content in map(inflated, streams) if b" cm" in content[:200]]
+            assert float(page.split(b" 0 0 ")[0].split()[-1]) == pytest.approx(drawn_to_saved, rel=1e-3)
+    save_figure(plot_run(run), path)
+    assert saved_size(path) == pytest.approx(SINGLE_COLUMN, abs=2 / 300)  # as before
+    with figures_for(purpose, width=5):
+        for drawing in (plot_graph(certified("fig3b")), plot_glance(certified("fig3b"))):
+            save_figure(drawing, path)
+            assert saved_size(path)[0] == pytest.approx(5, abs=2 / 300)
+
+
+def inflated(stream: bytes) -> bytes:
+    """The content of a stream of a PDF that is text."""
+    try:
+        return zlib.decompress(stream)
+    except zlib.error:
+        return b""
+
+
+def test_states_have_their_unit_on_every_axis_of_theirs() -> None:
+    cert = certified("sliding")
+    with figures_for(state_unit="m"):
+        assert plot_trajectory(cert).get_ylabel() == "state $x_k$ (m)"
+        assert plot_sliding(cert).get_ylabel() == "sliding variable $\\sigma_k$ (m)"
+        assert plot_glance(cert).axes[1].get_ylabel() == "state $x_k$ (m)"
+        assert plot_input(cert).get_ylabel() == "input $u_k$"
+    assert plot_trajectory(cert).get_ylabel() == "state $x_k$"
+
+
+def test_what_figures_are_not_made_for_is_refused() -> None:
+    for words, told in (({"purpose": "poster"}, "one of ieee, nature, slide"), ({"width": 0}, "0.5 to 100 inches")):
+        with pytest.raises(ParameterError, match=told), figures_for(**words):  # type: ignore[arg-type]
+            pass

@@ -14,14 +14,15 @@ from matplotlib.figure import Figure
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.report.page_figures import PLOTS
 from ptcc_certify.report.plots.decay import error_norm, resolved
-from ptcc_certify.report.plots.style import BOUND, RUN, SINGLE_COLUMN, STYLE, figure_bytes, finished, new_axes
+from ptcc_certify.report.plots.sizes import SINGLE_COLUMN
+from ptcc_certify.report.plots.style import BOUND, RUN, STYLE, figure_bytes, finished, new_axes
 
 #: The panels, in the order in which they stand, and what they show.
 PANELS = {
     "states": "States over time",
     "decay": "Error under its proved bound",
     "graph": "The graph: who listens to whom",
-    "input": "Size of the input over time",
+    "input": "Input over time",
     "sliding": "Sliding variables over time",
 }
 #: Share of the initial error down to which the decay is drawn, below which the integrator resolves little; and of time.

@@ -1,4 +1,4 @@
-"""Agents over time: a named line for each of a few, ranges and medians of the camps of many."""
+"""Agents over time: a line for each, names of a few, ranges and means of the camps of many."""
 
 from __future__ import annotations
 
@@ -23,15 +23,22 @@ from ptcc_certify.simulation.trajectory import Trajectory
 CAMP_STYLES: dict[str, tuple[str, Any]] = {
     "first camp": (RUN, "-"),
     "second camp": (BOUND, (0, (7, 1.5))),
-    "unbalanced leaders": ("#CC79A7", "-."),
+    "unbalanced leaders": ("#AA4499", "-."),
     "single leaders": ("#332288", (0, (1, 0.6))),
     "followers": (BEHIND, (0, (3, 1.5))),
     "agents": (BEHIND, "-"),
 }
-#: Agents, and agents of one part of a graph, of which each has a line.
-NAMED_AGENTS, NAMED_OF_PART = 8, 3
+#: Agents of which each has a line; agents, and agents of one part of a graph, of which each has its name.
+LINE_AGENTS, NAMED_AGENTS, NAMED_OF_PART = 60, 8, 3
 #: Size in points of names, and columns of a name; points that the label of a tick takes.
-NAME_SIZE, NAME_LENGTH, TICK_ROOM = 7, 16, 24
+NAME_SIZE, NAME_LENGTH, TICK_ROOM = 7, 18, 24
+#: Columns below which no name is broken to stand at both ends; how much wider than others letters may be.
+SHORT, WIDER = 6, 1.1
+#: The least share of the width of a panel for the time up to ``T``; points beside it for the axis and its label, and
+#: between a line and its name.
+TIME_SHARE, AXIS_ROOM, NAME_GAP = 0.55, 40, 10
+#: How far beyond ``T`` a figure goes, and how far if nothing changes by more than such a share there.
+LATEST, AFTER, CALM = 1.2, 1.1, 0.01
 #: What keeps a name legible upon lines.
 HALO = [patheffects.withStroke(linewidth=2, foreground="white")]
 
@@ -95,8 +102,8 @@ def camp_lines(groups: np.ndarray, agents: Iterable[int]) -> Iterator[tuple[int,
 
 
 def text_width(text: str) -> float:
-    """Return the width in points that a name has room for; letters of some scripts take two columns."""
-    return 0.62 * NAME_SIZE * columns(text)
+    """Return the width in points that a name, or its longest line, takes; letters of some scripts take two columns."""
+    return 0.62 * NAME_SIZE * max(map(columns, text.split("\n")))
 
 
 def draw_agents(
@@ -108,36 +115,38 @@ def draw_agents(
     size: bool = False,
     **style: Any,
 ) -> dict[int, str]:
-    """Draw a quantity of every agent, (N, M), in the colours and lines of camps; return the colours of single lines.
+    """Draw a quantity of every agent, (N, M), in the colours and lines of camps; return the colours of named lines.
 
-    Of up to eight agents each has a line. Of more, a part of the graph with more than three agents is drawn as its
-    range and median, with a line for the agent whose quantity is the largest at first, and for that with the least;
-    of a ``size``, which is never negative, the largest is drawn instead, and what is below it.
+    Of up to eight agents each is named; of more, in a part of the graph with more than three, the agent whose quantity
+    is the largest at first, and that with the least. Of more than 60 agents such a part is drawn as its range and mean,
+    and has no lines but these two; of a ``size``, which is never negative, as what is below the largest.
     """
     played = run.played if isinstance(run, Trajectory) else None
     group = camp_groups(structure) if played is None else family_groups(played.family)
-    single: dict[int, str] = {}
-    ranges = False
+    named: dict[int, str] = {}
     step: Any = "post" if style.get("drawstyle") == "steps-post" else None
+    few, ranges = len(group) <= NAMED_AGENTS, False
     for name, (colour, line) in CAMP_STYLES.items():
-        members = np.flatnonzero(group == name)
-        width, label = 0.9 if name == "followers" else 1.5, name
-        if len(group) > NAMED_AGENTS and members.size > NAMED_OF_PART:
+        members, label = np.flatnonzero(group == name), name
+        ends = members
+        if not few and members.size > NAMED_OF_PART:
             rows = np.nan_to_num(values[members])
-            high, low = rows.max(axis=0), 0 if size else rows.min(axis=0)
-            ax.fill_between(run.t, low, high, color=colour, alpha=0.2, linewidth=0, step=step)
-            middle = high if size else np.median(rows, axis=0)
-            ax.plot(run.t, middle, color=colour, linestyle=line, linewidth=2, label=name, **style)
-            ends = {int(rows[:, 0].argmax())} | (set() if size else {int(rows[:, 0].argmin())})
-            members = members[sorted(ends)]
-            width, label, ranges = 0.7, "", True
+            ends = members[sorted({int(rows[:, 0].argmax())} | (set() if size else {int(rows[:, 0].argmin())}))]
+            if len(group) > LINE_AGENTS:
+                high, low = rows.max(axis=0), 0 if size else rows.min(axis=0)
+                ax.fill_between(run.t, low, high, color=colour, alpha=0.2, linewidth=0, step=step)
+                middle = high if size else rows.mean(axis=0)
+                ax.plot(run.t, middle, color=colour, linestyle=line, linewidth=2, label=name, **style)
+                members, label, ranges = ends, "", True
+        width = (0.9 if name == "followers" else 1.5) if few else 0.6
         for v in members:
-            drawn = {"color": colour, "linestyle": line, "linewidth": width}
-            ax.plot(run.t, values[v], label=label or None, **drawn, **style)
-            label, single[int(v)] = "", colour
+            thick = width if few or v not in ends else 1.1
+            ax.plot(run.t, values[v], label=label or None, color=colour, linestyle=line, linewidth=thick, **style)
+            label = ""
+        named |= {int(v): colour for v in ends}
     if ranges:
-        ax.fill_between([], [], color=BEHIND, alpha=0.3, label="largest" if size else "median and range")
-    return single
+        ax.fill_between([], [], color=BEHIND, alpha=0.3, label="largest" if size else "mean and range")
+    return named
 
 
 def draw_deadlines(ax: Axes, run: Trajectory | AgentsTrajectory) -> None:
@@ -162,36 +171,52 @@ def name_agents(
 ) -> None:
     """Write the names of agents where their lines begin, and where they end if they end apart; show time ``until``.
 
-    If they are ``told``, the values at the ends stand beside the names there.
+    If they are ``told``, the values at the ends stand beside the names there. Names take so much room only that the
+    time up to ``T`` keeps more than half of the width: longer ones have two lines, or stand at the beginning alone.
+    Where nothing changes after ``T``, little of that is shown unless told.
 
     ``lines`` holds the colours of the lines by agent, as :func:`draw_agents` returns them.
     """
     if not lines or not run.t.size:
         return
+    first, last = float(run.t[0]), _seen_until(run, values) if until is None else until
     agents, colours = np.array(list(lines)), list(lines.values())
-    names = [shorten_text(printable(run.labels[v]), NAME_LENGTH - 4) for v in agents]
-    texts = [_spread(ax, values[agents, 0], names, colours)]
-    if ends:
-        digits = 2 - math.floor(math.log10(float(np.abs(values).max()) or 1.0))  # a run's 1e-9 is 0
-        tails = [f": {round(float(x), digits) + 0.0:.3g}" if told else "" for x in values[agents, -1]]
-        texts.append(_spread(ax, values[agents, -1], names, colours, tails))
-    if ends and not told and len(texts[1]) < 2:
-        del texts[1]  # all end at the same place
-    first, last = float(run.t[0]), float(run.t[-1]) if until is None else until
+    names = [shorten_text(printable(run.labels[v]), NAME_LENGTH) for v in agents]
+    at_end = values[agents, np.searchsorted(run.t, last * (1 + 1e-12), side="right") - 1]
+    digits = 2 - math.floor(math.log10(float(np.abs(np.nan_to_num(values)).max()) or 1.0))  # a run's 1e-9 is 0
+    tails = [f": {round(float(x), digits) + 0.0:.3g}" if told else "" for x in at_end]
+
+    def columns_of(letters: Sequence[int]) -> list[list[tuple[float, float, str, str]]]:
+        texts = [_spread(ax, values[agents, 0], names, colours, letters[0])]
+        if len(letters) > 1:
+            texts.append(_spread(ax, at_end, names, colours, letters[1], tails))
+        apart = len({height for height, *_ in texts[-1]}) > 1
+        return texts if told or apart else texts[:1]  # not where all end at the same place
+
+    wide, room, inside = _rooms(ax, (last - first) / ((min(last, _deadline(run)) - first) or 1))
+    texts = columns_of([NAME_LENGTH + 8] * (1 + ends))
+    needs = [max(text_width(name) for _, _, name, _ in column) for column in texts]
+    if (free := (room - NAME_GAP * len(needs)) / WIDER) < sum(needs):
+        right = [min(needs[1], max(free / 2, free - needs[0]))] if len(needs) > 1 else []
+        letters = [max(3, int(part / text_width("x"))) for part in (free - sum(right), *right)]
+        longest = max(map(columns, names))
+        if len(letters) > 1 and not told and min(letters) < max(longest / 2, min(longest, SHORT)):
+            letters = [max(3, int((room - NAME_GAP) / WIDER / text_width("x")))]
+        texts = columns_of(letters)
     for side, column in zip((-1, 1), texts, strict=False):
         for height, place, name, colour in column:
             line = {"arrowstyle": "-", "color": colour, "linewidth": 0.4, "shrinkA": 0, "shrinkB": 0, "clip_on": False}
             gap = 2 / text_width(name)  # the line begins beside the name: nothing is to be cut off
             line |= {"patchA": None, "relpos": (1 + gap if side < 0 else -gap, 0.5)}
-            style: dict[str, Any] = {"ha": "right" if side < 0 else "left", "va": "center_baseline", "color": colour}
+            turned = "right" if side < 0 else "left"
+            style: dict[str, Any] = {"ha": turned, "multialignment": turned, "color": colour, "linespacing": 1}
+            style |= {"va": "center" if "\n" in name else "center_baseline"}
             style |= {"fontsize": NAME_SIZE, "parse_math": False, "annotation_clip": False, "arrowprops": line}
             style["path_effects"] = HALO
             start, moved = ((first, last)[side > 0], height), (side * 8, place)
             ax.annotate(name, start, moved, textcoords=("offset points", "data"), **style)
-    rooms = [10 + max(text_width(name) for _, _, name, _ in column) for column in texts]
-    width = ax.get_window_extent().width / ax.figure.dpi * 72
-    width = min([0.8 * width, *(width - room for room in rooms[1:])])  # without names at the end, in any panel
-    own = max(width - rooms[0], width / 3)
+    rooms = [NAME_GAP + WIDER * max(text_width(name) for _, _, name, _ in column) for column in texts]
+    own = max(wide - rooms[0] - inside * sum(rooms[1:]), wide / 3)
     left = (last - first) * rooms[0] / own
     ticks = MaxNLocator(min(tick_count(ax.xaxis, 5), max(2, int(own / TICK_ROOM))), steps=STEPS).tick_values(
         first, last
@@ -201,12 +226,48 @@ def name_agents(
     ax.spines["bottom"].set_bounds(first, last)  # names have their room before time begins
 
 
+def _deadline(run: Trajectory | AgentsTrajectory) -> float:
+    """Return the time at which agents are where they should be; the last instant where there is no such time."""
+    prescribed = isinstance(run, AgentsTrajectory) or run.protocol.prescribed
+    return float(run.protocol.gain.T) if prescribed else float(run.t[-1])
+
+
+def _seen_until(run: Trajectory | AgentsTrajectory, values: np.ndarray) -> float:
+    """Return the time up to which something is to be seen."""
+    T, last = _deadline(run), float(run.t[-1])
+    after = np.nan_to_num(values[:, run.t > T])
+    calm = not after.size or np.ptp(after, axis=1).max() <= CALM * np.ptp(np.nan_to_num(values))
+    return min(last, (AFTER if calm else LATEST) * T)
+
+
+def _rooms(ax: Axes, shown: float) -> tuple[float, float, float]:
+    """Return the width of axes in points, how much of it names may take, and the share in it of names behind the lines.
+
+    The time that is ``shown`` is given in units of that up to ``T``. Axes that have a fixed place have room for names
+    behind the lines on their right.
+    """
+    points = 72 / ax.figure.dpi
+    spec = ax.get_subplotspec()
+    if fixed := spec is None or ax.figure.figure.get_layout_engine() is None:  # type: ignore[union-attr]
+        wide = ax.get_window_extent().width * points
+        panel = wide + 2 * AXIS_ROOM
+    else:
+        panel = ax.figure.bbox.width * points * len(spec.colspan) / spec.get_gridspec().ncols
+        wide = panel - AXIS_ROOM
+    return wide, max(wide + AXIS_ROOM * fixed - TIME_SHARE * panel * shown, 0), 1.0 - fixed
+
+
 def _spread(
-    ax: Axes, heights: np.ndarray, names: Sequence[str], colours: Sequence[str], tails: Sequence[str] = ()
+    ax: Axes,
+    heights: np.ndarray,
+    names: Sequence[str],
+    colours: Sequence[str],
+    letters: int,
+    tails: Sequence[str] = (),
 ) -> list[tuple[float, float, str, str]]:
     """Return heights of lines, heights of their names, which do not overlap, names with their tails, and colours.
 
-    Lines that cannot be told apart there share one name, and one tail.
+    Lines that cannot be told apart there share one name, and one tail. Names have so many ``letters`` in a line.
     """
     tails = tails or [""] * len(names)
     alike = list(zip(colours, tails, strict=True))
@@ -219,22 +280,44 @@ def _spread(
     for k in np.argsort(at, kind="stable"):
         if groups and at[k] - at[groups[-1][0]] < gap / 6:
             at[k] = at[groups[-1][0]]
-        if groups and at[k] == at[groups[-1][0]] and alike[k] == alike[groups[-1][0]]:
-            groups[-1].append(int(k))
+        same = [own for own in groups if at[k] == at[own[0]] and alike[k] == alike[own[0]]]
+        if same:
+            same[0].append(int(k))
         else:
             groups.append([int(k)])
+    texts = [_written([names[k] for k in sorted(own)], tails[own[0]], letters) for own in groups]
+    sizes = gap * np.array([1 + text.count("\n") for text in texts])
     place = np.array([at[own[0]] for own in groups])
-    steps = gap * np.arange(len(groups))
-    place = np.clip(isotonic_regression(place - steps).x, low + gap / 2, max(low + gap / 2, high - steps[-1])) + steps
-    lines, texts = scale.inverted().transform([at[own[0]] for own in groups]), scale.inverted().transform(place)
-    joint = [_joined([names[k] for k in sorted(own)]) + tails[own[0]] for own in groups]
-    return list(zip(lines, texts, joint, [colours[own[0]] for own in groups], strict=True))
+    steps = np.concatenate([[0], np.cumsum((sizes[1:] + sizes[:-1]) / 2)])
+    least = low + sizes[0] / 2
+    place = np.clip(isotonic_regression(place - steps).x, least, max(least, high - sizes[-1] / 2 - steps[-1])) + steps
+    lines, places = scale.inverted().transform([at[own[0]] for own in groups]), scale.inverted().transform(place)
+    return list(zip(lines, places, texts, [colours[own[0]] for own in groups], strict=True))
 
 
-def _joined(names: Sequence[str]) -> str:
-    """Join names, and count those for which there is no room."""
+def _written(names: Sequence[str], tail: str, letters: int) -> str:
+    """Join names with their tail, in a line or two of so many letters, and count those for which there is no room."""
     for shown in range(len(names), 0, -1):
-        more = [f"+{len(names) - shown}"] if shown < len(names) else []
-        if columns(text := ", ".join([*names[:shown], *more])) <= NAME_LENGTH:
-            return text
-    return text
+        text = ", ".join([*names[:shown], *([f"+{len(names) - shown}"] if shown < len(names) else [])])
+        if columns(text) <= NAME_LENGTH and columns(text + tail) <= letters:
+            return text + tail
+        head, rest = _halves(text, letters)
+        if columns(text) <= NAME_LENGTH and columns(rest + tail) <= letters:
+            break
+    rest = shorten_text(rest, max(letters - columns(tail), 4))
+    return f"{head}\n{rest}{tail}" if rest else f"{head}{tail.replace(' ', chr(10))}"
+
+
+def _halves(text: str, letters: int) -> tuple[str, str]:
+    """Break a text after so many letters, or after the last word of which there is not much less.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.camp_lines import _halves
+    >>> _halves("north-sea platform", 10), _halves("unbreakable", 6)
+    (('north-sea', 'platform'), ('unbrea', 'kable'))
+    """
+    end = max(k for k in range(1, len(text) + 1) if columns(text[:k]) <= letters or k == 1)
+    breaks = [k for k in range(end // 2, end + 1) if k and (text[k - 1] in " -_./," or text[k : k + 1] == " ")]
+    end = breaks[-1] if breaks and end < len(text) else end
+    return text[:end].rstrip(), text[end:].lstrip()

@@ -14,13 +14,20 @@ from ptcc_certify.bounds.envelope import FLOOR_FACTOR
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.model.gain import Gain
-from ptcc_certify.report.plots.runs_under_signals import bound_label, is_worst, keeps_promise, line_of, runs_of
+from ptcc_certify.report.plots.runs_under_signals import (
+    bound_label,
+    is_worst,
+    keeps_promise,
+    line_of,
+    no_bound_text,
+    runs_of,
+)
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.report.plots.subject import certifies_family, ideal_run_of, ideal_text, limits_text, require_same
 from ptcc_certify.simulation.trajectory import Trajectory
 
 #: Horizontal axes of the decay, and their labels; that of time has a unit.
-_DECAY_AXES = {"left": "remaining time, $1 - t/T$", "time": "time $t$", "clock": "stretched clock $s(t)$"}
+DECAY_AXES = {"left": "remaining time, $1 - t/T$", "time": "time $t$", "clock": "stretched clock $s(t)$"}
 #: What is drawn below the integrator's floor, as a share of it.
 _BELOW_FLOOR = 1e-2
 #: 1 - t/T down to which bounds are drawn where there is no run, and how many instants.
@@ -56,7 +63,8 @@ def plot_decay(
     that run is drawn besides; the bounds, and the run with circles, are without these.
 
     Of the certificate of a family ``max_k |x_k(t) - x_k(T)|`` under many signals is drawn below its bound for every
-    signal, of those runs that have settled at ``T``, or of which it is proved where they end.
+    signal, of those runs that have settled at ``T``, or of which it is proved where they end. Where no bound is drawn
+    the legend says why.
 
     Parameters
     ----------
@@ -94,8 +102,8 @@ def plot_decay(
     >>> [line.get_label() for line in plot_decay(cert.trajectory).lines]
     ['simulated (CVODES)', "integrator's floor"]
     """
-    if axis not in _DECAY_AXES:
-        raise ParameterError(f'axis "{axis}" is unknown; one of {", ".join(_DECAY_AXES)}')
+    if axis not in DECAY_AXES:
+        raise ParameterError(f'axis "{axis}" is unknown; one of {", ".join(DECAY_AXES)}')
     if certifies_family(subject):
         return _draw_signals(axes_of(ax), subject, runs_of(subject, runs), axis, time_unit)
     proved = subject if isinstance(subject, Certificate) else certificate
@@ -136,7 +144,7 @@ def plot_decay(
         ax.axvline(at, color="black", linewidth=0.8, linestyle=(0, (5, 2, 1, 2)), label="$T_r$")
     name = r"\varepsilon" if proved is not None and proved.graph_proof.envelope.coordinates == "eps" else "E"
     title = "" if run is None else limits_text(run if asked is None else asked, proved)
-    return finished(ax, _label(axis, time_unit), rf"$\|{name}(t)\| \,/\, \|{name}(0)\|$", title)
+    return finished(ax, axis_label(axis, time_unit), rf"$\|{name}(t)\| \,/\, \|{name}(0)\|$", title)
 
 
 def _draw_signals(ax: Axes, certificate: Certificate, runs: Sequence[Trajectory], axis: str, time_unit: str) -> Axes:
@@ -144,12 +152,12 @@ def _draw_signals(ax: Axes, certificate: Certificate, runs: Sequence[Trajectory]
     first = runs[0]
     before = first.remaining > 0
     bound = certificate.proof.deviation_bound(first.remaining[before]).max(axis=0)
-    if not np.isfinite(bound).any():
-        raise ParameterError("the certificate holds no proved bound of a decay; draw its states")
+    bounded = bool(np.isfinite(bound).any())
     place = {"left": first.remaining, "time": first.t, "clock": first.clock}[axis][before]
     floor = FLOOR_FACTOR * first.rtol * (float(np.abs(first.states[:, 0]).max()) or 1.0)
     if not (bound >= floor).any():
         raise NothingDecays(NONE)
+    seen = [bound if bounded else np.zeros(bound.size)]
     own = certificate.family_proof.signal == "any" or keeps_promise(certificate, runs)
     names = {False: "random signals" if own else "any signal (random)", True: "worst cases found"}
     known = _known_end(certificate)
@@ -158,11 +166,17 @@ def _draw_signals(ax: Axes, certificate: Certificate, runs: Sequence[Trajectory]
         if end is not None and np.array_equal(run.t, first.t):
             gap = np.abs(run.states[:, before] - end[:, None]).max(axis=0)
             ax.plot(place, np.where(gap > floor, gap, np.nan), label=names.pop(is_worst(run), None), **line_of(run))
-    ax.plot(place, bound, color=BOUND, linewidth=1.8, label=bound_label(certificate), zorder=4)
+            seen.append(gap)
+    if bounded:
+        ax.plot(place, bound, color=BOUND, linewidth=1.8, label=bound_label(certificate), zorder=4)
+    top = np.max(np.where(np.isfinite(seen), seen, 0), axis=0)
+    if not (top > floor).any():
+        raise ParameterError(f"{no_bound_text(certificate)}, and no run has settled; draw its states")
     _draw_floor(ax, floor, floor / 10)
-    last = int(np.flatnonzero(bound >= floor / 10)[-1])
-    _scale(ax, axis, place[[0, max(last, 1)]], (floor / 10, 3 * float(bound[np.isfinite(bound)].max())))
-    return finished(ax, _label(axis, time_unit), r"$\max_k |x_k(t) - x_k(T)|$")
+    last = int(np.flatnonzero((bound if bounded else top) >= floor / 10)[-1])
+    _scale(ax, axis, place[[0, max(last, 1)]], (floor / 10, 3 * float(top.max())))
+    title = "" if bounded else no_bound_text(certificate)
+    return finished(ax, axis_label(axis, time_unit), r"$\max_k |x_k(t) - x_k(T)|$", title)
 
 
 def _known_end(certificate: Certificate) -> np.ndarray | None:
@@ -180,8 +194,9 @@ def _scale(ax: Axes, axis: str, ends: np.ndarray, limits: tuple[float, float]) -
     ax.set_xlim(*ends)
 
 
-def _label(axis: str, time_unit: str) -> str:
-    return time_label(_DECAY_AXES[axis], time_unit) if axis == "time" else _DECAY_AXES[axis]
+def axis_label(axis: str, time_unit: str) -> str:
+    """Return the label of one of :data:`DECAY_AXES`."""
+    return time_label(DECAY_AXES[axis], time_unit) if axis == "time" else DECAY_AXES[axis]
 
 
 def _draw_floor(ax: Axes, floor: float, bottom: float) -> None:

@@ -20,7 +20,8 @@ from ptcc_certify.report.plots.adjacency import draw_adjacency
 from ptcc_certify.report.plots.camp_lines import CAMP_STYLES, camp_groups, family_camps, family_groups
 from ptcc_certify.report.plots.graph_labels import INSIDE, boxes_along, draw_labels, draw_sizes
 from ptcc_certify.report.plots.graph_layout import FREE_NODES, Arrow, places_and_bends, triangles_of
-from ptcc_certify.report.plots.style import EDGE_STYLES, SINGLE_COLUMN, axes_of, finished, styled
+from ptcc_certify.report.plots.sizes import SINGLE_COLUMN, current_sizes
+from ptcc_certify.report.plots.style import BEHIND, EDGE_STYLES, axes_of, finished, styled
 from ptcc_certify.report.plots.subject import is_of_family, structure_of
 from ptcc_certify.report.text_layout import columns, printable, shorten_text
 from ptcc_certify.theorems.counterexample_text import mode_name
@@ -136,7 +137,8 @@ def _draw_family(family: Family, ax: Axes | None, colours: Sequence[Any] | None)
     modes = family.modes[:PANELS]
     side = 2 if len(modes) > 1 and family.n_nodes <= BESIDE_NODES else 1
     rows, title = math.ceil(len(modes) / side), _TITLE if len(modes) > 1 else 0.0
-    width = SINGLE_COLUMN[0] / side if ax is None else ax.get_window_extent().width / ax.figure.dpi / side
+    column = current_sizes().of(SINGLE_COLUMN)[0]
+    width = (column if ax is None else ax.get_window_extent().width / ax.figure.dpi) / side
     high = width * _SHAPE
     layout = None
     edges = [weight_ranges(mode) for mode in modes]
@@ -147,7 +149,8 @@ def _draw_family(family: Family, ax: Axes | None, colours: Sequence[Any] | None)
         high = layout.size[1] / 72
     else:
         title *= 2  # matrices name their axes
-    ax = axes_of(ax, (SINGLE_COLUMN[0], _LEGEND + rows * (high + title)))
+    height = SINGLE_COLUMN[0] / column * (_LEGEND + rows * (high + title))  # which is in inches of the drawing
+    ax = axes_of(ax, (SINGLE_COLUMN[0], height))
     ax.set_axis_off()
     panels = [ax]
     if len(modes) > 1:
@@ -291,7 +294,7 @@ def _draw_coloured(
         ax.plot([], [], "o", color="white", markersize=6, label="leads", **outline)
     for name, (marker, _) in _SHAPES.items():
         if (groups == name).any():
-            ax.plot([], [], marker, color="0.5", markersize=6, label=name)
+            ax.plot([], [], marker, color=BEHIND, markersize=6, label=name)
 
 
 def _draw_arrows(
@@ -341,7 +344,8 @@ def fit_height(ax: Axes, boxes: np.ndarray, radius: float) -> None:
     scale = figure.get_figwidth() / np.ptp(ax.get_xlim())
     room = 0.1 + (0 if legend is None else legend.get_window_extent().height / figure.dpi)
     ax.set_ylim(low, high)
-    figure.set_figheight(min(_HEIGHT, room + scale * (high - low)))
+    if current_sizes().shape is None:
+        figure.set_figheight(min(figure.get_figheight(), room + scale * (high - low)))
 
 
 def draw_ground(ax: Axes, graph: SignedDigraph, place: np.ndarray, nodes: Sequence[int], radius: float) -> None:

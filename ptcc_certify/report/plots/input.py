@@ -18,7 +18,14 @@ from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.report.facts.input import initial_states_text
 from ptcc_certify.report.plots.camp_lines import NAME_SIZE, draw_agents, draw_deadlines, name_agents
 from ptcc_certify.report.plots.motion import agents_run
-from ptcc_certify.report.plots.runs_under_signals import bound_label, count_of_signals, is_worst, line_of, runs_of
+from ptcc_certify.report.plots.runs_under_signals import (
+    bound_label,
+    count_of_signals,
+    is_worst,
+    line_of,
+    no_bound_text,
+    runs_of,
+)
 from ptcc_certify.report.plots.style import BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.report.plots.subject import certifies_family, limits_text, require_same, structure_of, trajectory_of
 from ptcc_certify.simulation.agents import AgentsTrajectory
@@ -32,11 +39,19 @@ RESOLVED_ERROR = 10
 #: An input that grows to so many times its initial size, or is above such a share of its largest for less than such a
 #: share of the time, is drawn on a logarithmic axis,
 LARGE_GROWTH, LARGE, BRIEF = 3, 1 / 5, 1 / 8
-#: from so many decades below its initial size on; changes of sign go further down.
-INPUT_DECADES = 3
+#: from so many decades below its initial size on; with signs from so many, and linear about 0.
+INPUT_DECADES, SIGNED_DECADES = 3, 2
 #: A bound is drawn as a line up to so many times the largest input of the run, else named at the top; on a linear axis,
 #: and on a logarithmic one.
 HIGH_PEAK, HIGH_PEAK_OF_LOGARITHM = 1.6, 30
+
+
+class InputAxis(NamedTuple):
+    """An axis of inputs: where they begin to be drawn by their decades, 0 of a linear axis, and between which ends."""
+
+    least: float
+    low: float
+    high: float
 
 
 class Peak(NamedTuple):
@@ -55,21 +70,23 @@ def plot_input(
     certificate: Certificate | None = None,
     runs: Sequence[Trajectory] | None = None,
     time_unit: str = "",
+    beside: Sequence[Any] = (),
 ) -> Axes:
-    """Draw ``|u_k(t)|`` of one run in the colours and lines of the camps, and the peak that a certificate proves.
+    """Draw ``u_k(t)`` of one run in the colours and lines of the camps, and the peak of ``|u_k|`` that is proved.
 
-    Lines and names are those of :func:`plot_trajectory`; of more than eight agents the largest input in each part of
-    the graph is drawn, with a line for the agent whose input is the largest at first. The axis is linear; logarithmic
-    for an input that grows to three times its initial size, or is large for a short time alone. Behind an actuator it
-    is the input that acts. Nothing is drawn where the integrator no longer resolves what the gain multiplies. No peak
-    is drawn where none holds: for runs that begin later than 0, sampled inputs, disturbance or noise of the nominal
-    protocol, boundary layers. Of a certificate with one set of limits of the gain the run under these is drawn, and
-    their peak; with late messages or moving leaders the run with these, and what bounds its input, if anything does;
-    the legend names them. A held input is drawn in steps if every period is sampled.
+    Lines and names are those of :func:`plot_trajectory`. The axis is linear; for an input that grows to three times its
+    initial size, or is large for a short time alone, it is logarithmic on both sides of a linear part about 0. Behind
+    an actuator it is the input that acts. Nothing is drawn where the integrator no longer resolves what the gain
+    multiplies. No peak is drawn where none holds: for runs that begin later than 0, sampled inputs, disturbance or
+    noise of the nominal protocol, boundary layers. Of a certificate with one set of limits of the gain the run under
+    these is drawn, and their peak; with late messages or moving leaders the run with these, and what bounds its input,
+    if anything does; the legend names them. A held input is drawn in steps if every period is sampled.
 
     Of a family the largest input under each of many signals is drawn, below its bound for every signal; signals of a
-    search for worst cases keep the error large, and their inputs need not be: "slowest found". Of agents of order n it
-    is the size of each agent's input, under the sliding-mode protocol of its nominal part; the peak is of the whole.
+    search for worst cases keep the error large, and their inputs need not be: "slowest found". Where no bound holds the
+    legend says why. Of agents of order n it
+    is each agent's input, in several dimensions its size, under the sliding-mode protocol of its nominal part; the peak
+    is of the whole.
 
     Parameters
     ----------
@@ -83,6 +100,8 @@ def plot_input(
         Of a family, by default under eight random signals and worst cases.
     time_unit : str
         Of the deadline, for the label of the axis.
+    beside : sequence of Certificate, Trajectory or AgentsTrajectory
+        Of the panels beside this one, which are to have the same axis of inputs.
 
     Returns
     -------
@@ -99,39 +118,64 @@ def plot_input(
     >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
     >>> ax = plot_input(cert)
     >>> ax.get_ylabel(), ax.texts[0].get_text()
-    ('input $|u_k|$', 'certified peak 16.01')
+    ('input $u_k$', 'certified peak 16.01')
     """
     ax, x = axes_of(ax), time_label("time $t$", time_unit)
     if certifies_family(subject):
         runs = runs_of(subject, runs)
-        _draw_signals(ax, subject, runs)
+        bounded = _draw_signals(ax, subject, runs)
         draw_deadlines(ax, runs[0])
-        return finished(ax, x, r"$\max_k |u_k|$", count_of_signals(subject, runs))
+        words = [count_of_signals(subject, runs), *([] if bounded else [no_bound_text(subject)])]
+        return finished(ax, x, r"$\max_k |u_k|$", "; ".join(words))
+    drawn = _inputs_of(subject, certificate)
+    run = drawn.run
+    structure = analyse(run.graph) if isinstance(run, AgentsTrajectory) else structure_of(subject)
+    named = draw_agents(ax, run, drawn.values, structure, size=drawn.sizes, drawstyle=drawn.steps)
+    every = [drawn.axis, *(_inputs_of(other, None).axis for other in beside)]
+    least = min((one.least for one in every if one.least), default=0.0)
+    axis = InputAxis(least, min(one.low for one in every), max(one.high for one in every))
+    _draw_peaks(ax, run.t, drawn.values, drawn.peaks, axis)
+    draw_deadlines(ax, run)
+    name_agents(ax, run, drawn.values, named)
+    return finished(ax, x, drawn.name, drawn.title)
+
+
+class _Inputs(NamedTuple):
+    """The inputs of a run, (N, M), or their sizes, what bounds them, and how they are named and drawn."""
+
+    run: Trajectory | AgentsTrajectory
+    values: np.ndarray
+    sizes: bool
+    peaks: list[Peak]
+    name: str
+    title: str = ""
+    steps: str = "default"
+
+    @property
+    def axis(self) -> InputAxis:
+        return _axis_of(self.run.t, self.values, self.peaks, signed=not self.sizes)
+
+
+def _inputs_of(subject: Any, certificate: Certificate | None) -> _Inputs:
+    """Return what is drawn of the inputs of one run."""
     certificate = subject if isinstance(subject, Certificate) else certificate
     if isinstance(subject, AgentsTrajectory) or (certificate is not None and certificate.proof.agents is not None):
         moved = agents_run(subject)
-        run: Trajectory | AgentsTrajectory = moved
-        sliding = moved.protocol.base.reaching is not None
-        name = "nominal input" if sliding else "input"
-        name += " $|u_k|$" if run.input.shape[1] == 1 else r" $\|u_k\|$"
-        size = np.sqrt((run.input**2).sum(axis=1))
-        steps, title = "default", ""
-        peaks = [] if certificate is None else _agents_peaks(certificate, sliding)
-    else:
-        run, name = trajectory_of(subject), "input $|u_k|$"
-        size, steps = np.abs(_resolved_input(run)), "steps-post" if _every_period_sampled(run) else "default"
-        peaks = [] if certificate is None else _peaks(run, certificate)
-        title = limits_text(run, certificate)
-    structure = analyse(run.graph) if isinstance(run, AgentsTrajectory) else structure_of(subject)
-    named = draw_agents(ax, run, size, structure, size=True, drawstyle=steps)
-    _draw_peaks(ax, run.t, size, peaks)
-    draw_deadlines(ax, run)
-    name_agents(ax, run, size, named)
-    return finished(ax, x, name, title)
+        sliding, sizes = moved.protocol.base.reaching is not None, moved.input.shape[1] > 1
+        name = f"{'nominal ' if sliding else ''}input " + (r"$\|u_k\|$" if sizes else "$u_k$")
+        values = np.sqrt((moved.input**2).sum(axis=1)) if sizes else moved.input[:, 0]
+        return _Inputs(moved, values, sizes, [] if certificate is None else _agents_peaks(certificate, sliding), name)
+    run = trajectory_of(subject)
+    steps = "steps-post" if _every_period_sampled(run) else "default"
+    peaks = [] if certificate is None else _peaks(run, certificate)
+    return _Inputs(run, _resolved_input(run), False, peaks, "input $u_k$", limits_text(run, certificate), steps)
 
 
-def _draw_signals(ax: Axes, certificate: Certificate, runs: Sequence[Trajectory]) -> None:
-    """Draw the largest input under many signals below its bound for every signal, and the proved peak."""
+def _draw_signals(ax: Axes, certificate: Certificate, runs: Sequence[Trajectory]) -> bool:
+    """Draw the largest input under many signals below its bound for every signal, and the proved peak.
+
+    Tell whether there is such a bound.
+    """
     proof = certificate.family_proof
     first, gain = runs[0], certificate.protocol.gain
     before = first.remaining > 0
@@ -147,33 +191,53 @@ def _draw_signals(ax: Axes, certificate: Certificate, runs: Sequence[Trajectory]
         ax.plot(run.t[own], resolved, label=names.pop(is_worst(run), None), **line_of(run))
         sizes.append(np.interp(first.t, run.t[own], np.nan_to_num(resolved), right=0.0))
     bound = proof.input_bound(left).max(axis=0)
-    if np.isfinite(bound).all():
+    if bounded := bool(np.isfinite(bound).all()):
         ax.plot(t, bound, color=BOUND, linewidth=1.8, label=bound_label(certificate))
         sizes.append(np.interp(first.t, t, bound, right=0.0))
     peaks = [Peak(float(peak), f"certified peak {up(peak, 4)}") for peak in sorted(proof.input_peaks or ())[-1:]]
-    _draw_peaks(ax, first.t, np.array(sizes), peaks)
+    _draw_peaks(ax, first.t, np.array(sizes), peaks, _axis_of(first.t, np.array(sizes), peaks, signed=False))
     ax.set_xlim(0, float(first.t[-1]))
+    return bounded
 
 
-def _draw_peaks(ax: Axes, t: np.ndarray, size: np.ndarray, peaks: Sequence[Peak]) -> None:
-    """Set the axis of inputs of these sizes, (N, M), and draw what bounds them, with names; those far above at the top.
+def _axis_of(t: np.ndarray, values: np.ndarray, peaks: Sequence[Peak], *, signed: bool) -> InputAxis:
+    """Return the axis of inputs, or of their sizes, (N, M), with those of their bounds that are not far above.
 
-    The axis is logarithmic where a linear one would leave most of the time, ``t`` (M,), flat. Of two lines the higher
-    one has its name above it, the lower one below.
+    It is logarithmic where a linear one would leave most of the time, ``t`` (M,), flat.
     """
-    largest = np.nan_to_num(size)
-    first, top = float(largest[:, :1].max(initial=0)), float(largest.max(initial=0))
-    even = np.interp(np.linspace(t[0], t[-1], 401), t, largest.max(axis=0))
+    values = np.nan_to_num(values)
+    first, top = (float(np.abs(some).max(initial=0)) for some in (values[:, :1], values))
+    even = np.interp(np.linspace(t[0], t[-1], 401), t, np.abs(values).max(axis=0))
     brief = (even > LARGE * top).mean() < BRIEF
-    logarithmic = bool(first and (brief or top > LARGE_GROWTH * first))
-    most = HIGH_PEAK_OF_LOGARITHM if logarithmic else HIGH_PEAK
-    shown = [peak for peak in peaks if peak.value <= most * top or top == 0]
-    height = max([top, *(peak.value for peak in shown)])
-    if logarithmic:
+    least = 0.0
+    if first and (brief or top > LARGE_GROWTH * first):
+        least = first * 10.0 ** -(SIGNED_DECADES if signed else INPUT_DECADES)
+    shown = [peak.value for peak in peaks if _is_near(peak, top, least)]
+    room = 2 if least else 1.12
+    high, low = room * max([float(values.max(initial=0)), *shown]), float(values.min(initial=0))
+    if not signed:
+        return InputAxis(least, least, high or 1.0)
+    low = room * min([low, *(-peak for peak in shown)])
+    return InputAxis(least, min(low, -least), max(high * (2 if least else 1), least) or 1.0)  # with room for a name
+
+
+def _is_near(peak: Peak, top: float, least: float) -> bool:
+    """Tell whether a bound is drawn as a line."""
+    return top == 0 or peak.value <= (HIGH_PEAK_OF_LOGARITHM if least else HIGH_PEAK) * top
+
+
+def _draw_peaks(ax: Axes, t: np.ndarray, values: np.ndarray, peaks: Sequence[Peak], axis: InputAxis) -> None:
+    """Set the axis of inputs, (N, M), and draw what bounds them, with names; those far above at the top.
+
+    Of two lines the higher one has its name above it, the lower one below.
+    """
+    top = float(np.abs(np.nan_to_num(values)).max(initial=0))
+    shown = [peak for peak in peaks if _is_near(peak, top, axis.least) and peak.value <= axis.high]
+    if axis.least and axis.low >= axis.least:
         ax.set_yscale("log", nonpositive="clip")
-        ax.set_ylim(first * 10.0**-INPUT_DECADES, height * 2)
-    else:
-        ax.set_ylim(0, 1.12 * height or 1)
+    elif axis.least:
+        ax.set_yscale("symlog", linthresh=axis.least, linscale=0.5)
+    ax.set_ylim(axis.low, axis.high)
     ground = {"boxstyle": "square,pad=0.05", "facecolor": "white", "edgecolor": "none"}
     style: dict[str, Any] = {"ha": "right", "fontsize": NAME_SIZE, "textcoords": "offset points", "bbox": ground}
     above = 0
@@ -183,7 +247,8 @@ def _draw_peaks(ax: Axes, t: np.ndarray, size: np.ndarray, peaks: Sequence[Peak]
             ax.annotate(f"{peak.name}, above", (1, 1), place, xycoords=at, va="top", color=peak.color, **style)
             above += 1
             continue
-        ax.plot(t[[0, -1]], [peak.value] * 2, color=peak.color, linewidth=0.9, linestyle="--")  # not over names
+        for height in (peak.value, -peak.value)[: 1 + (axis.low < 0)]:
+            ax.plot(t[[0, -1]], [height] * 2, color=peak.color, linewidth=0.9, linestyle="--")  # not over names
         low = any(other.value > peak.value for other in shown)
         ends: dict[str, Any] = {"va": "top" if low else "bottom", "color": peak.color}
         sides = ("axes fraction", "data")

@@ -25,7 +25,8 @@ from ptcc_certify.report.plots.camp_lines import (
     name_agents,
 )
 from ptcc_certify.report.plots.graph import node_id
-from ptcc_certify.report.plots.style import SINGLE_COLUMN, axes_of, finished, new_axes, shown, styled, time_label
+from ptcc_certify.report.plots.sizes import DOUBLE_COLUMN, SINGLE_COLUMN, current_sizes
+from ptcc_certify.report.plots.style import BEHIND, axes_of, finished, new_axes, shown, styled, time_label
 from ptcc_certify.report.plots.subject import read_back
 from ptcc_certify.report.text_layout import printable, shorten_text
 from ptcc_certify.simulation.agents import AgentsTrajectory
@@ -61,7 +62,7 @@ def agents_run(subject: Any) -> AgentsTrajectory:
 def plot_motion(subject: Any, *, wide: bool = False, time_unit: str = "") -> Figure:
     """Draw positions, velocities and so on over time, of each coordinate below each other.
 
-    Of more than eight agents, parts of the graph with more than three are drawn as their range and median.
+    Of more than 60 agents, parts of the graph with more than three are drawn as their range and mean.
 
     Parameters
     ----------
@@ -97,7 +98,8 @@ def plot_motion(subject: Any, *, wide: bool = False, time_unit: str = "") -> Fig
     width, height = SINGLE_COLUMN
     with style.context(STYLE):
         rows, columns = (n, d) if wide else (n * d, 1)
-        figure = Figure((2 * width if wide else width, 0.75 * height * rows), layout="constrained")
+        size = (DOUBLE_COLUMN[0] if wide else width), 0.75 * height * rows
+        figure = Figure(current_sizes().of(size), layout="constrained")
         structure = analyse(run.graph)
         for i in range(n):
             for q in range(d):
@@ -182,8 +184,8 @@ def plot_formation(subject: Any, *, ax: Axes | None = None) -> Axes:
     ax.set_aspect("equal", adjustable="datalim")
     if run.graph.n_nodes <= 2 * NAMED_AGENTS:
         _name_starts(ax, run)
-    for face, name in (("white", "at $t = 0$"), ("#7F7F7F", "at $t = T$")):
-        ax.plot([], [], "o", markersize=4, markerfacecolor=face, markeredgecolor="#7F7F7F", label=name)
+    for face, name in (("white", "at $t = 0$"), (BEHIND, "at $t = T$")):
+        ax.plot([], [], "o", markersize=4, markerfacecolor=face, markeredgecolor=BEHIND, label=name)
     return finished(ax, "$x$", "$y$")
 
 

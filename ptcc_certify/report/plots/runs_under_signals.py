@@ -24,6 +24,7 @@ from ptcc_certify.simulation.switching_signals import (
     Signal,
 )
 from ptcc_certify.simulation.trajectory import Trajectory
+from ptcc_certify.theorems.family_behaviour import DEPENDS
 
 #: Random signals that are drawn beside the worst cases.
 _RANDOM = 8
@@ -124,6 +125,16 @@ def count_of_signals(certificate: Certificate, runs: Sequence[Trajectory]) -> st
     """Tell how many signals are drawn, and where some are promised, whether these keep the promise or are any."""
     kept = " of the kind asked for" if keeps_promise(certificate, runs) else " of any kind"
     return f"{len(runs)} signals{'' if certificate.family_proof.signal == 'any' else kept}"
+
+
+def no_bound_text(certificate: Certificate) -> str:
+    """Say that no bound for every signal is drawn, and why: none exists, or none is proved.
+
+    Where the behaviour depends on the signal, switching shortly before ``T`` still moves agents from some states.
+    """
+    depends = any(part.component.behaviour == DEPENDS for part in certificate.family_proof.parts)
+    exists = "exists for all states and signals" if certificate.family_proof.signal == "any" else "is proved"
+    return f"no bound {exists}: the behaviour {DEPENDS}" if depends else "no bound is proved"
 
 
 def is_worst(run: Trajectory) -> bool:

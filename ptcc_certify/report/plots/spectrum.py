@@ -16,7 +16,7 @@ from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
 
 #: Colour and marker of the classes of certificates.
-CLASS_MARKERS = {"paper": ("#000000", "s"), "perron": ("#009E73", "^"), "lmi": (RUN, "o"), "full": (BOUND, "D")}
+CLASS_MARKERS = {"paper": ("#000000", "s"), "perron": ("#007A5A", "^"), "lmi": (RUN, "o"), "full": (BOUND, "D")}
 
 
 @styled

@@ -1,4 +1,4 @@
-"""The style of all figures: sizes, colours, axes, ticks, legends, and how figures are saved."""
+"""The style of all figures: colours, axes, ticks, legends, and how figures are saved."""
 
 from __future__ import annotations
 
@@ -22,20 +22,22 @@ from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullFormatt
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.io.files import refuse_no_path
+from ptcc_certify.report.plots.sizes import SINGLE_COLUMN, current_sizes
 from ptcc_certify.report.plots.subject import read_back
 
 #: Matplotlib's name of the style of all figures.
 STYLE = "ptcc_certify.ptcc"
-#: Width and height in inches of figures as wide as a column, or two, of a journal.
-SINGLE_COLUMN, DOUBLE_COLUMN = (3.5, 2.7), (7.16, 2.9)
 #: What figures are saved as; PDF and SVG are vectors.
 FIGURES = (".png", ".pdf", ".svg")
-#: Colours that the colour-blind tell apart (Okabe and Ito): what runs, what bounds it, what stands behind.
-RUN, BOUND, BEHIND = "#0072B2", "#D55E00", "#7F7F7F"
+#: Colours of what runs, what bounds it, what stands behind. All colours of figures are dark enough for names on white,
+#: a contrast of 4.5 and more, and those of camps stay apart for eyes without the cones of green.
+RUN, BOUND, BEHIND = "#0072B2", "#B84E00", "#707070"
 #: Colour and line of an edge from an ally (+1) or an opponent (-1); no camp has them.
 EDGE_STYLES = {1: ("#117733", "-", "from an ally"), -1: ("#882255", "--", "from an opponent")}
 #: Characters of the title of a legend for an inch of the axes below it.
 _TITLE = 22
+#: How labels of vertical axes begin that are of states, and have their unit.
+_OF_STATES = ("state ", "position", "sliding variable", r"$\max_k |x_k(t)")
 #: Between ticks lie these numbers of units, times a power of ten.
 STEPS = [1, 2, 2.5, 5, 10]
 
@@ -117,11 +119,38 @@ def figure_bytes(figure: FigureBase, suffix: str) -> bytes:
     Letters of scripts that the font does not have become boxes, without a word about each.
     """
     undated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(suffix)
-    buffer = io.BytesIO()
+    buffer, scale = io.BytesIO(), current_sizes().scale_of(float(figure.get_figwidth()))  # type: ignore[attr-defined]
+    more: dict[str, Any] = {"metadata": undated}
     with style.context(STYLE), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing from")
-        figure.savefig(buffer, format=suffix[1:], metadata=undated)  # type: ignore[attr-defined]
-    return buffer.getvalue()
+        if suffix == ".png" and scale != 1:
+            dpi = float(rcParams["savefig.dpi"])
+            more |= {"dpi": scale * dpi, "pil_kwargs": {"dpi": (dpi, dpi)}}
+        target = _scaled_pdf(buffer, scale, undated) if suffix == ".pdf" and scale != 1 else buffer
+        figure.savefig(target, format=suffix[1:], **more)  # type: ignore[attr-defined]
+        if target is not buffer:
+            target.close()
+    if suffix != ".svg" or scale == 1:
+        return buffer.getvalue()
+
+    def resized(tag: re.Match[bytes]) -> bytes:
+        return re.sub(rb'\b((?:width|height)=")([\d.]+)', lambda m: m[1] + b"%.6f" % (scale * float(m[2])), tag[0])
+
+    return re.sub(rb"<svg[^>]*>", resized, buffer.getvalue(), count=1)
+
+
+def _scaled_pdf(buffer: io.BytesIO, scale: float, metadata: Any) -> Any:
+    """Return a PDF that scales what is drawn on its pages."""
+    from matplotlib.backends.backend_pdf import Op, PdfFile, PdfPages
+
+    class Scaled(PdfFile):
+        def newPage(self, width: float, height: float) -> None:
+            super().newPage(scale * width, scale * height)
+            self.output(scale, 0, 0, scale, 0, 0, Op.concat_matrix)
+
+    pages: Any = PdfPages(buffer, metadata=metadata)
+    pages._file = Scaled(buffer, metadata=metadata)
+    return pages
 
 
 def new_axes(figure: FigureBase, place: tuple[int, int, int] = (1, 1, 1), **keywords: Any) -> Axes:
@@ -140,7 +169,7 @@ def new_axes(figure: FigureBase, place: tuple[int, int, int] = (1, 1, 1), **keyw
 
 def axes_of(ax: Axes | None, size: tuple[float, float] = SINGLE_COLUMN) -> Axes:
     """Return axes as they are given, or make new ones of a figure of their own."""
-    return new_axes(Figure(size, layout="constrained")) if ax is None else ax
+    return new_axes(Figure(current_sizes().of(size), layout="constrained")) if ax is None else ax
 
 
 def time_label(quantity: str, unit: str) -> str:
@@ -156,9 +185,19 @@ def tick_count(axis: Axis, most: int = 6) -> int:
 def place_ticks(axis: Axis) -> None:
     """Place ticks that do not collide: on a logarithmic axis at decades, over two or so at 1, 2, 5 too.
 
-    Ticks that were placed by hand stay.
+    Of an axis that is logarithmic on both sides of 0 they are at equal decades of both. Ticks that were placed by hand
+    stay.
     """
     if isinstance(axis.get_major_locator(), FixedLocator):
+        return
+    if axis.get_scale() == "symlog":
+        low, high = axis.get_view_interval()
+        least = math.ceil(math.log10(axis.get_transform().linthresh) - 1e-9)  # type: ignore[attr-defined]
+        sides = [(sign, math.floor(math.log10(max(sign * end, 1e-300)))) for sign, end in ((-1, low), (1, high))]
+        step = max(1, -(-sum(max(most - least + 1, 0) for _, most in sides) // tick_count(axis, 8)))
+        ticks = [sign * 10.0**k for sign, most in sides for k in range(least, most + 1, step)]
+        axis.set_major_locator(FixedLocator([0, *ticks]))
+        axis.set_minor_locator(NullLocator())
         return
     if axis.get_scale() != "log":
         axis.set_major_locator(MaxNLocator(tick_count(axis), steps=STEPS))
@@ -189,9 +228,11 @@ def factor_out(axis: Axis, label: str) -> str:
 
 def finished(ax: Axes, x: str, y: str, title: str = "") -> Axes:
     """Name the axes, and put the legend above them, where it covers no data, in as many columns as its width takes."""
+    unit = current_sizes().state_unit if y.startswith(_OF_STATES) else ""
     for axis, label in ((ax.xaxis, x), (ax.yaxis, y)):
         place_ticks(axis)
-        axis.set_label_text(factor_out(axis, label) if label else "")
+        label = factor_out(axis, label) if label else ""
+        axis.set_label_text(time_label(label, unit) if axis is ax.yaxis else label)
     if labels := ax.get_legend_handles_labels()[1]:
         width = ax.get_window_extent().width / ax.figure.dpi
         columns = legend_columns(labels, 1.2 * width, 1 if width < 2.2 else 2 if width < 4 else 3)

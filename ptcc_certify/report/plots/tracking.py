@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,8 +11,8 @@ from ptcc_certify.bounds.delay.late_messages import LateBounds
 from ptcc_certify.certificate.asked_run import late_run
 from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.errors import Change, ParameterError
-from ptcc_certify.report.plots.decay import NONE, NothingDecays
-from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
+from ptcc_certify.report.plots.decay import NONE, NothingDecays, axis_label
+from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled
 from ptcc_certify.report.plots.subject import certificate_of, certifies_family
 from ptcc_certify.simulation.trajectory import Trajectory
 
@@ -29,10 +29,17 @@ _SEEN = 1e-3
 
 #: Bounds below which nothing is to be seen.
 _NOTHING = 1e-200
+#: If a bound falls to less than this share the axis is of the time that remains, until it is so near to what is left at
+#: ``T``, and never nearer to ``T`` than the last.
+_SMALL, _NEAR, _LAST = 1e-2, 1.05, 1e-6
+#: Instants of a bound that is drawn alone.
+_INSTANTS = 401
 
 
 @styled
-def plot_tracking(subject: Any, *, ax: Axes | None = None, time_unit: str = "") -> Axes:
+def plot_tracking(
+    subject: Any, *, ax: Axes | None = None, axis: Literal["left", "time"] | None = None, time_unit: str = ""
+) -> Axes:
     """Draw how far the farthest agent is from where it should be, under the proved bound.
 
     While messages are late that is its final state, in the runs the farther off, the later messages are; where delays
@@ -44,6 +51,9 @@ def plot_tracking(subject: Any, *, ax: Axes | None = None, time_unit: str = "") 
     subject : Certificate
         With late messages or moving leaders, and an initial state; of a family the bound is drawn alone.
     ax : Axes, optional
+    axis : {"left", "time"}, optional
+        Horizontally the time left ``1 - t/T``, logarithmic, running towards the deadline; or the time ``t``. By default
+        the time left if less than a hundredth of the bound is left at ``T``, and after it where leaders move.
     time_unit : str
         Of time on the axis.
 
@@ -54,15 +64,19 @@ def plot_tracking(subject: Any, *, ax: Axes | None = None, time_unit: str = "") 
     Raises
     ------
     ParameterError
-        No certificate, or one that says nothing of late messages or moving leaders, or has no initial state.
+        No certificate, or one that says nothing of late messages or moving leaders, or has no initial state; or an
+        unknown axis.
 
     Examples
     --------
     >>> graph = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1)])
     >>> p = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
     >>> cert = certify(graph, p, [1, 0, 2], messages=LateMessages(delay="0.05"), asks=Asks(simulation=False))
-    >>> [line.get_label() for line in plot_tracking(cert).lines]
+    >>> ax = plot_tracking(cert)
+    >>> [line.get_label() for line in ax.lines]
     ['as late as allowed', 'now late, now not', 'proved bound', 'at least, if as late as allowed']
+    >>> ax.get_xlabel(), plot_tracking(cert, axis="time").get_xlabel()
+    ('remaining time, $1 - t/T$', 'time $t$')
     >>> cert = certify(graph, p, [1, 0, 2], leaders=MovingLeaders(speed=1), asks=Asks(simulation=False))
     >>> [line.get_label() for line in plot_tracking(cert).lines]
     ['worst leaders', 'proved bound', '$T$']
@@ -72,35 +86,64 @@ def plot_tracking(subject: Any, *, ax: Axes | None = None, time_unit: str = "") 
     if late is None or not late.says_something:
         what = "the certificate says nothing of late messages or of leaders that move; certify with "
         raise ParameterError((what, Change("delay"), " or ", Change("leader_speed")))
+    if axis not in (None, "left", "time"):
+        raise ParameterError("axis", f"= {axis!r} is unknown; one of left, time")
     T = float(certificate.protocol.T)
-    t = np.linspace(0, T, 401)
-    if (late.of_followers or late.of_all) and late.largest_bound(t).max() < _NOTHING:
+    left = np.unique(np.concatenate([np.geomspace(1, _LAST / 10, _INSTANTS), np.linspace(1, 0, _INSTANTS)]))[::-1]
+    t, bounded = T * (1 - left), bool(late.of_followers or late.of_all)
+    bound = late.largest_bound(t) if bounded else np.full(t.size, np.inf)
+    if bound.max() < _NOTHING:
         raise NothingDecays(NONE)
-    ax = axes_of(ax)
+    runs: list[tuple[Trajectory, dict[str, Any]]] = []
     if not certificate.of_family:
         if x0 is None or certificate.proof.final_state is None:
             raise ParameterError("the certificate has no initial state to run from; certify with x0")
-        t = _draw_runs(ax, certificate.graph_proof, late)
-    _draw_bound(ax, late, t)
-    if late.tracks:
-        ax.axvline(T, color=BEHIND, linewidth=0.8, linestyle=":", label="$T$")
-        ax.set_ylim(bottom=0)
-    ax.set_xlim(0, t[-1])
+        runs = _runs(certificate.graph_proof, late)
+    after = runs[-1][0].t if runs else t
+    if axis is None:
+        small = bounded and max(bound[-1], *late.largest_bound(after[after >= T])) < _SMALL * bound[0]
+        axis = "left" if small else "time"
+    ax = axes_of(ax)
+    drawn = [_draw_run(ax, certificate.graph_proof, late, run, axis, style) for run, style in runs]
+    if axis == "time" and runs:
+        t = after
+        bound = late.largest_bound(t) if bounded else np.full(t.size, np.inf)
+    place = left if axis == "left" else t
+    if bounded:
+        ax.plot(place, bound, color=BOUND, linewidth=1.8, label="proved bound")
+    if axis == "left":
+        near = left[(bound > _NEAR * bound[-1]) & (left > 0)].min(initial=1.0)
+        end = max(_LAST, near / 2)
+        ax.set(xscale="log", yscale="log", xlim=(1, end))
+        shown, low = bound[(left >= end) & (bound > 0)], [far[place >= end].min() for place, far in drawn]
+        ax.set_ylim(max(min([shown.min() / 1.5, *low]) / 2, shown.min() * _SEEN), 2 * shown.max())
+    else:
+        end = t[-1]
+        ax.set_xlim(0, end)
+        if late.tracks:
+            ax.axvline(T, color=BEHIND, linewidth=0.8, linestyle=":", label="$T$")
+            ax.set_ylim(bottom=0)
+        else:
+            ax.set_yscale("log")
+    _draw_marks(ax, late, float(end), float(bound[-1]) if bounded else None)
     moving = "" if late.leaders is None else "(t)"
-    return finished(ax, time_label("time $t$", time_unit), rf"$\max_k |x_k(t) - x_k^*{moving}|$")
+    return finished(ax, axis_label(axis, time_unit), rf"$\max_k |x_k(t) - x_k^*{moving}|$")
 
 
-def _draw_runs(ax: Axes, proof: GraphProof, late: LateBounds) -> np.ndarray:
-    """Draw the runs of one graph; return their instants."""
+def _draw_run(
+    ax: Axes, proof: GraphProof, late: LateBounds, run: Trajectory, axis: str, style: dict[str, Any]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Draw how far the agents of a run are from where they should be; return where on the axis, and how far."""
     nodes, ends = proof.structure.followers, np.asarray(proof.final_state, dtype=float)
     if not nodes.size or late.vehicles is not None or late.of_all:
         nodes = np.arange(proof.graph.n_nodes)
-    t = np.linspace(0, float(proof.protocol.T), 401)
-    for run, style in _runs(proof, late):
-        aims = ends[:, None] if run.targets is None else run.targets
-        ax.plot(run.t, np.abs(run.states - aims)[nodes].max(axis=0), **style)
-        t = run.t
-    return t
+    aims = ends[:, None] if run.targets is None else run.targets
+    far = np.abs(run.states - aims)[nodes].max(axis=0)
+    place = 1 - run.t / float(proof.protocol.T) if axis == "left" else run.t
+    if axis == "left":
+        place, far = place[place > 0], far[place > 0]
+    ax.plot(place, far, **style)
+    return place, far
 
 
 def _runs(proof: GraphProof, late: LateBounds) -> list[tuple[Trajectory, dict[str, Any]]]:
@@ -118,18 +161,15 @@ def _runs(proof: GraphProof, late: LateBounds) -> list[tuple[Trajectory, dict[st
     return [(run, style) for run, style in runs if run is not None]
 
 
-def _draw_bound(ax: Axes, late: LateBounds, t: np.ndarray) -> None:
-    """Draw what is proved, and what is the least that a bound can be."""
-    if not late.tracks:
-        ax.set_yscale("log")
-    if late.of_followers or late.of_all:
-        over_time = late.largest_bound(t)
-        ax.plot(t, over_time, color=BOUND, linewidth=1.8, label="proved bound")
-        nearer = not late.tracks and 0 < late.largest < _NEARER * float(over_time[-1])
-    else:
-        nearer = late.form is not None
+def _draw_marks(ax: Axes, late: LateBounds, end: float, bound: float | None) -> None:
+    """Draw at ``T``, where the axis ends, what is proved there alone, and what is the least that a bound can be."""
+    nearer = late.form is not None if bound is None else not late.tracks and 0 < late.largest < _NEARER * bound
+    low: list[float] = [ax.get_ylim()[0]]
     if nearer:  # another proof, which says nothing of what is before T
-        ax.plot(t[-1:], [late.largest], marker="_", color=BOUND, markersize=12, label="proved at $T$", linestyle="none")
+        ax.plot([end], [late.largest], marker="_", color=BOUND, markersize=12, label="proved at $T$", linestyle="none")
+        low.append(late.largest / 2)
     if late.missed is not None and late.missed.bound >= _SEEN * late.largest:
         marks: dict[str, Any] = {"marker": "v", "color": BOUND, "linestyle": "none", "markersize": 4, "clip_on": False}
-        ax.plot(t[-1:], [float(late.missed.bound)], label="at least, if as late as allowed", **marks)
+        ax.plot([end], [float(late.missed.bound)], label="at least, if as late as allowed", **marks)
+        low.append(float(late.missed.bound) / 2)
+    ax.set_ylim(bottom=min(low))

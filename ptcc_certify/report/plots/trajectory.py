@@ -24,18 +24,8 @@ from ptcc_certify.report.plots.camp_lines import (
     name_agents,
 )
 from ptcc_certify.report.plots.runs_under_signals import bound_label, count_of_signals, is_worst, runs_of
-from ptcc_certify.report.plots.style import (
-    BEHIND,
-    BOUND,
-    DOUBLE_COLUMN,
-    SINGLE_COLUMN,
-    axes_of,
-    finished,
-    new_axes,
-    share_legend,
-    styled,
-    time_label,
-)
+from ptcc_certify.report.plots.sizes import DOUBLE_COLUMN, SINGLE_COLUMN, current_sizes
+from ptcc_certify.report.plots.style import BEHIND, BOUND, axes_of, finished, new_axes, share_legend, styled, time_label
 from ptcc_certify.report.plots.subject import certifies_family, limits_text, structure_of, trajectory_of
 from ptcc_certify.simulation.trajectory import Trajectory
 
@@ -50,8 +40,8 @@ def plot_trajectory(
     """Draw the states ``x_k(t)`` of one run, in the colours and lines of the camps, and the deadline ``T``.
 
     In a formation these are positions, the places added.
-    Of up to eight agents each has a line with its name. Of more, parts of the graph with more than three agents are
-    drawn as their range and median, and the agents that begin highest and lowest by name.
+    Of up to eight agents each line has its name, of more those of the agents that begin highest and lowest in each part
+    of the graph. Of more than 60 agents these parts are drawn as their range and mean.
 
     Of the certificate of a family thin lines are runs under random signals, thicker ones under worst cases, in the
     colours and lines of the camps: those of the consensus, or what agents are in every mode. Shaded: where those of a
@@ -95,7 +85,8 @@ def plot_trajectory(
         named, limits = draw_agents(ax, run, values, structure_of(subject)), None
         title = limits_text(run, subject if isinstance(subject, Certificate) else None)
     draw_deadlines(ax, run)
-    name_agents(ax, run, values, named, ends=limits is None)
+    until = None if limits is None else float(run.t[-1])  # beyond T stand bars of final states
+    name_agents(ax, run, values, named, ends=limits is None, until=until)
     if limits is not None:
         ax.set_ylim(limits)
     return finished(ax, time_label("time $t$", time_unit), "state $x_k$", title)
@@ -205,12 +196,12 @@ def plot_run(
     2
     """
     width, height = DOUBLE_COLUMN if wide else SINGLE_COLUMN
-    run = trajectory_of(subject)
+    sizes, run = current_sizes(), trajectory_of(subject)
     if run.sliding is None or not run.sliding.sigma0.any():
-        figure = Figure((width, height), layout="constrained")
+        figure = Figure(sizes.of((width, height)), layout="constrained")
         plot_trajectory(subject, ax=new_axes(figure), time_unit=time_unit)
         return figure
-    figure = Figure((width, 1.8 * height), layout="constrained")
+    figure = Figure(sizes.of((width, 1.8 * height)), layout="constrained")
     upper = new_axes(figure, (2, 1, 1))
     lower = new_axes(figure, (2, 1, 2))
     plot_trajectory(run, ax=upper, time_unit=time_unit)
