@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 HERE = Path(__file__).parent
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+COLOURS = ("#0072B2", "#B84E00", "#007A5A", "#CC79A7", "#E69F00", "#56B4E9")
 MARKERS = "osD^vP"
 
 Curves = dict[str, list[tuple[float, float]]]
