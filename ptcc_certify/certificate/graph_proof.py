@@ -26,6 +26,7 @@ from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, wor
 from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.proof import Proof
+from ptcc_certify.certificate.tube import Tube, tube_of
 from ptcc_certify.checker import INPUT_NODES
 from ptcc_certify.checker.final_state import AgentsVector
 from ptcc_certify.checker.lyapunov_form import Form
@@ -309,6 +310,26 @@ class GraphProof(Proof):
             The certificate has no initial state, or an instant is not from 0 to 1.
         """
         return self.envelope.deviation_bound(remaining, self.require_initial_state())
+
+    @gated
+    def tube(self, t: Sequence[float] | np.ndarray, targets: np.ndarray | None = None) -> Tube:
+        """Return where every agent is proved to be at instants, to be compared with a run of anybody.
+
+        See :func:`ptcc_certify.certificate.tube.tube_of`, and :meth:`ptcc_certify.certificate.tube.Tube.compare`.
+
+        Parameters
+        ----------
+        t : (M,) array_like
+            From 0 on, in units of time.
+        targets : (N, M) array, optional
+            Where agents aim at while leaders move.
+
+        Raises
+        ------
+        ParameterError
+            There is no initial state, an instant is not finite or before 0; or leaders move, and no targets are given.
+        """
+        return tube_of(self, t, targets)
 
     def require_initial_state(self) -> tuple[Fraction, ...]:
         """Return the initial state, or refuse a certificate without one."""

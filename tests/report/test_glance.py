@@ -103,3 +103,26 @@ def test_the_command_makes_a_film(tmp_path: Path) -> None:
     assert made.code == 0 and made.out.startswith("written") and (tmp_path / "a.gif").stat().st_size
     refused = command("animate", file, "-o", str(tmp_path / "a.txt"))
     assert refused.code == 2 and refused.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", ["fig5a", "late", "vehicles", "group-vehicles", "formation"])
+def test_a_run_of_anybody_is_compared_with_the_tube(name: str) -> None:
+    cert = certificate(name)
+    run = cert.asked_trajectory or cert.simulate()
+    tube, x = cert.tube(run.t), run.positions
+    assert tube.compare(x, tolerance=1e-6).inside and tube.compare(x.T, tolerance=1e-6).inside
+    k, at = np.unravel_index(int((tube.high - tube.low)[:, 1:].argmin()), (len(x), run.t.size - 1))
+    off = np.array(x)
+    off[k, at + 1] = tube.high[k, at + 1] + 0.5
+    found = tube.compare(off, tolerance=1e-6)
+    assert not found.inside and found.agent == cert.labels[k] and abs(found.outside - 0.5) < 1e-4
+    with pytest.raises(ParameterError, match="have shape"):
+        tube.compare(x[:, :3])
+
+
+def test_where_leaders_move_targets_are_asked_for() -> None:
+    cert = certificate("moving")
+    with pytest.raises(ParameterError, match="give their targets"):
+        cert.tube([0.5])
+    run = cert.asked_trajectory
+    assert cert.tube(run.t, run.targets).compare(run.positions, tolerance=1e-6).inside

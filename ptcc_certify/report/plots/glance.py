@@ -16,6 +16,7 @@ from matplotlib.figure import Figure, SubFigure
 from lmi.exact.decimal_rounding import near
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.fact import Fact
+from ptcc_certify.certificate.tube import tube_of
 from ptcc_certify.errors import ParameterError, SimulationError, spell
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, LABELLED_NODES, REPEATED_NODES
 from ptcc_certify.report.facts.of_certificate import facts_of
@@ -253,13 +254,13 @@ def _draw_run(ax: Axes, certificate: Certificate, run: Any, ends: np.ndarray, ti
     if len(values) > _LINES:
         named = draw_agents(ax, run, values, certificate.graph_proof.structure)
     else:
-        tubes = _tubes(certificate, run) if isinstance(run, Trajectory) else None
+        tube = tube_of(certificate.graph_proof, run.t, run.targets) if isinstance(run, Trajectory) else None
         for k, colour in enumerate(colours):
             width = 1.3 if len(values) <= _NAMED else 0.8
             ax.plot(run.t, values[k], color=colour, linewidth=width, gid=node_id(k, "run"))
-            if tubes is not None:
-                low, high = tubes
-                ax.fill_between(run.t, low[k], high[k], color=colour, alpha=_SHADE / max(5, len(values)), linewidth=0)
+            if tube is not None and np.isfinite(tube.low[k]).any():
+                shade: dict[str, Any] = {"alpha": _SHADE / max(5, len(values)), "linewidth": 0}
+                ax.fill_between(run.t, tube.low[k], tube.high[k], color=colour, **shade)
         named = dict(enumerate(colours))
     least, most = float(values.min()), float(values.max())
     room = 0.06 * (most - least) or 1.0
@@ -277,26 +278,3 @@ def _draw_run(ax: Axes, certificate: Certificate, run: Any, ends: np.ndarray, ti
     )
     position = certificate.proof.agents is not None or certificate.proof.velocities is not None
     finished(ax, time_label("time $t$", time_unit), "position" if position else "state $x_k$")
-
-
-def _tubes(certificate: Certificate, run: Trajectory) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return where every agent is proved to be at the instants of a run: bounds from below and above, (N, M) each."""
-    proof, late = certificate.graph_proof, certificate.proof.late
-    if proof.final_state is None:
-        return None
-    aims = np.asarray(proof.final_state, dtype=float)[:, None] if run.targets is None else run.targets
-    off = np.full(run.states.shape, np.inf)
-    if late is not None and late.says_something:
-        if late.vehicles is not None:
-            off = late.vehicles_over_time(run.t)[0]
-        else:
-            off[[v for c in proof.structure.closed_components if len(c.nodes) == 1 for v in c.nodes]] = (
-                0  # aims themselves
-            )
-            off[late.followers] = late.deviation_bound(run.t)
-            for one in late.of_all:
-                off = np.fmin(off, one.over_time(late.case, run.t).bound)
-    elif not certificate.limits and not proof.leaders_move:
-        off = proof.deviation_bound(np.clip(run.remaining, 0, 1))
-    places = np.zeros((len(off), 1)) if run.conditions.places is None else run.conditions.places[:, None]
-    return aims - off + places, aims + off + places
