@@ -21,10 +21,10 @@ The names at the top, by topic:
 - Bounds and design: ``final_state``, ``influence``, ``formation_of_biases``, ``box``, ``ellipsoid``,
   ``worst_initial_state``, ``design``, ``design_agents``
 - Many graphs: ``Ensemble``, ``certify_many``
-- Figures: ``plot_glance``, ``animate``, ``plot_influence``, ``plot_trajectory``, ``plot_decay``, ``plot_run``,
-  ``plot_sliding``, ``plot_trade_off``, ``plot_input``, ``plot_effort``, ``plot_graph``, ``plot_spectrum``,
-  ``plot_frontier``, ``plot_motion``, ``plot_formation``, ``plot_tracking``, ``save_figure``, ``SINGLE_COLUMN``,
-  ``DOUBLE_COLUMN``, ``figures_for``
+- Figures: ``plot_glance``, ``plot_influence``, ``plot_trajectory``, ``plot_decay``, ``plot_run``, ``plot_sliding``,
+  ``plot_trade_off``, ``plot_input``, ``plot_effort``, ``plot_graph``, ``plot_spectrum``, ``plot_frontier``,
+  ``plot_motion``, ``plot_formation``, ``plot_tracking``, ``save_figure``, ``SINGLE_COLUMN``, ``DOUBLE_COLUMN``,
+  ``figures_for``
 - Reports: ``write_report``, ``explore``, ``cite``
 - Errors: ``PTCCError``
 
@@ -101,7 +101,6 @@ _EXPORTS = {
     "certify_many": "batch",
     # Figures
     "plot_glance": "report.plots.glance",
-    "animate": "report.plots.animation",
     "plot_motion": "report.plots.motion",
     "plot_formation": "report.plots.motion",
     "plot_trajectory": "report.plots.trajectory",

@@ -219,6 +219,22 @@ class Recorded(Evidence):
         """
         return rendered("page_figures.plot", self, what or "glance", **keywords)
 
+    def animate(self, path: str | Path, **keywords: Any) -> None:
+        """Write a film of the certificate, ``.gif``, ``.html`` or ``.mp4``: agents on their way in their tubes.
+
+        Parameters
+        ----------
+        path : str or Path
+        **keywords : Any
+            ``seconds`` and ``time_unit`` of :func:`ptcc_certify.report.plots.animation.animate`.
+
+        Raises
+        ------
+        ParameterError
+            The certificate is of a family, has no initial state or more than 40 agents; or there is no such film.
+        """
+        rendered("plots.animation.animate", self, path, **keywords)
+
     # ------------------------------------------------------------------ equality
 
     def __eq__(self, other: object) -> bool:

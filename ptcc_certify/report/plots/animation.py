@@ -59,7 +59,7 @@ def animate(subject: Any, path: str | Path, *, seconds: float = 5, time_unit: st
     >>> foes = SignedDigraph.from_edges([("ann", "bob", -1), ("bob", "ann", -1)])
     >>> cert = certify(foes, NominalProtocol(T=1, rho1=1, rho2=2, kappa=1), [3, 5])
     >>> with TemporaryDirectory() as folder:
-    ...     animate(cert, Path(folder, "run.gif"), seconds=0.2)
+    ...     cert.animate(Path(folder, "run.gif"), seconds=0.2)
     ...     Path(folder, "run.gif").read_bytes()[:6]
     b'GIF89a'
     """
