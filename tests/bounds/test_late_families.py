@@ -440,7 +440,7 @@ def test_figures_are_of_what_is_asked(tmp_path: Path):
     late, moving = certified("late"), certified("leaders that move")
     assert [late.main_figure, moving.main_figure] == ["late", "tracking"]
     assert [line.get_label() for line in late.plot("late").lines] == ["proved bound"]
-    assert [line.get_label() for line in moving.plot("tracking").lines] == ["proved bound", "$T$"]
+    assert [line.get_label() for line in moving.plot("tracking", axis="time").lines] == ["proved bound", "$T$"]
     for what in ("states", "decay", "input"):
         with pytest.raises(ParameterError, match="no run of a family is made with late messages"):
             late.plot(what)

@@ -300,7 +300,7 @@ def test_the_bound_that_is_drawn_is_above_the_vehicles(cap: int | None, delay: s
     bound = made.late.largest_bound(run.t[inside])
     assert (away[:, inside].max(axis=0) <= bound * (1 + 1e-6) + 1e-9).all() and bound[0] < 10
     assert (made.late.deviation_bound(run.t[inside]).max(axis=0) <= bound).all()
-    lines = {line.get_label(): line.get_ydata() for line in made.plot("late").lines}
+    lines = {line.get_label(): line.get_ydata() for line in made.plot("late", axis="time").lines}
     assert (lines["vehicles"] <= lines["proved bound"] * (1 + 1e-6) + 1e-9).all()
 
 
