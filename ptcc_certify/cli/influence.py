@@ -38,6 +38,11 @@ def influence(graph: str, output: str | None, as_json: bool, screen: Screen, **o
         raise ParameterError(f"{output}: a table is written to .csv, a heat map to {', '.join(FIGURES)}; choose one")
     refuse_output(output)
     who = influence_of(read(graph, options))
+    drawn = None
+    if kind in FIGURES:  # refused, if so, before anything is told
+        from ptcc_certify.report.plots.influence import plot_influence
+
+        drawn = plot_influence(who)
     if as_json:
         labels, shares = who.structure.graph.labels, who.shares.tolist()
         rows = {label: {labels[j]: str(x) for j, x in who.row(k).items()} for k, label in enumerate(labels)}
@@ -46,13 +51,12 @@ def influence(graph: str, output: str | None, as_json: bool, screen: Screen, **o
     else:
         screen.show(lambda details: [*graph_facts(who.structure, graph, details), *influence_facts(who)])
     if output is not None:
-        if kind == ".csv":
+        if drawn is None:
             write_atomically(output, who.to_csv())
         else:
-            from ptcc_certify.report.plots.influence import plot_influence
             from ptcc_certify.report.plots.style import save_figure
 
-            save_figure(plot_influence(who), output)
+            save_figure(drawn, output)
         if not as_json:
             screen.note(f"written    {output}")
     return ExitCode.OK

@@ -508,7 +508,7 @@ class SignedDigraph(ReadOnly, Shown):
         Parameters
         ----------
         *nodes : int or str
-            Indices, or labels if these are texts.
+            Indices, or labels if these are texts; or one list of these.
 
         Raises
         ------
@@ -521,7 +521,8 @@ class SignedDigraph(ReadOnly, Shown):
         >>> graph.without_nodes("a").edges
         (('b', 'c', Fraction(-2, 1)),)
         """
-        out = {place_of(node, self.labels) for node in nodes}
+        given = nodes[0] if len(nodes) == 1 and isinstance(nodes[0], list | tuple | set | frozenset) else nodes
+        out = {place_of(node, self.labels) for node in given}
         left = [k for k in range(self.n_nodes) if k not in out]
         if not left:
             raise GraphError("without these nodes there is no graph; leave one of them in")
@@ -533,7 +534,7 @@ class SignedDigraph(ReadOnly, Shown):
         Parameters
         ----------
         *edges : pair of int or str
-            Source and target, as information flows.
+            Source and target, as information flows; or one list of these.
 
         Raises
         ------
@@ -548,7 +549,8 @@ class SignedDigraph(ReadOnly, Shown):
         (3, (('b', 'a', Fraction(1, 1)), ('b', 'c', Fraction(-2, 1))))
         """
         out = set()
-        for edge in edges:
+        given = edges[0] if len(edges) == 1 and isinstance(edges[0], list | set | frozenset) else edges
+        for edge in given:
             if isinstance(edge, str) or len(edge) != 2:
                 raise GraphError(f"{shorten(repr(edge))} is no edge; give pairs (source, target)")
             out.add(tuple(place_of(node, self.labels) for node in edge))

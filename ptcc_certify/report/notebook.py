@@ -66,7 +66,7 @@ def certificate_html(certificate: Certificate) -> str:
     small, figure = certificate.graph_proof.graph.n_nodes <= SHOWN_NODES, None
     with suppress(PTCCError):
         figure = plot_glance(certificate, words=False) if small else None
-    return _page(facts, figure, "who listens to whom, and the run of every agent where it is proved to be")
+    return _page(facts, figure, "who listens to whom, and the run of every agent within its bounds")
 
 
 @html_of.register(Family)

@@ -17,7 +17,18 @@ from ptcc_certify.report.plots.glance import ENDS, colours_of, plot_glance
 from ptcc_certify.report.plots.graph import node_id
 
 CORPUS = Path(__file__).parents[1] / "corpus"
-KINDS = ["fig3a", "late", "late-moving", "vehicles", "group-vehicles", "formation", "sliding", "single", "parts"]
+KINDS = [
+    "fig3a",
+    "odd-labels",
+    "late",
+    "late-moving",
+    "vehicles",
+    "group-vehicles",
+    "formation",
+    "sliding",
+    "single",
+    "parts",
+]
 
 
 def certificate(name: str) -> ptcc.Certificate:
@@ -126,3 +137,29 @@ def test_where_leaders_move_targets_are_asked_for() -> None:
         cert.tube([0.5])
     run = cert.asked_trajectory
     assert cert.tube(run.t, run.targets).compare(run.positions, tolerance=1e-6).inside
+
+
+def test_colours_and_values_are_of_the_run_where_leaders_move() -> None:
+    """They were those of leaders at rest."""
+    cert = certificate("moving")
+    ax = plot_glance(cert).axes[1]
+    run = cert.asked_trajectory
+    lines = {line.get_gid(): line for line in ax.lines if line.get_gid()}
+    at_T = [np.interp(float(cert.protocol.T), run.t, x) for x in run.positions]
+    assert [lines[node_id(k, "run")].get_color() for k in range(len(at_T))] == colours_of(np.array(at_T))
+    told = " ".join(text.get_text().replace("\n", " ") for text in ax.texts)
+    for x in at_T:
+        assert f": {round(x, 2):.3g}" in told, (x, told)
+
+
+@pytest.mark.parametrize("name", ["refuted", "refuted-rate", "family-refuted", "gain-cap"])
+def test_what_was_asked_is_told_beside_a_claim_that_is_proved(name: str) -> None:
+    read = certificate(name)
+    texts = [text.get_text() for text in plot_glance(read).texts]
+    told = next(text for text in texts if text.startswith("verdict: "))
+    assert "certified" not in texts and told[9:30] == read.facts()[-1].text[:21]
+
+
+def test_numerical_bounds_are_named() -> None:
+    titles = [plot_glance(certificate(name)).axes[1].get_title(loc="left") for name in ("sliding", "sliding-rest")]
+    assert titles == ["shaded: bounds integrated in floats (numerical)", ""]

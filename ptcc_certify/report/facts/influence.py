@@ -31,7 +31,7 @@ def influence_facts(who: Influence) -> Facts:
     >>> from ptcc_certify.report.facts.influence import influence_facts
     >>> for fact in influence_facts(ptcc.influence([("a", "c", 1), ("b", "c", -3)])):
     ...     print(f"{fact.head}: {fact.text}")
-    decides: b 58 %, a 42 %
+    decides: b 58.3 %, a 41.7 %
     x(T): a ends at x_a, c at 0.25 x_a - 0.75 x_b, b at x_b
     """
     labels = who.structure.graph.labels
@@ -40,20 +40,18 @@ def influence_facts(who: Influence) -> Facts:
         yield Fact(head="decides", note="nobody: every node ends at 0, wherever it begins")
         return
     order = [int(j) for j in np.argsort(-shares, kind="stable") if shares[j]]
-    texts = [f"{labelled(agent_text(labels[j]))} {100 * shares[j]:.2g} %" for j in order]
+    texts = [f"{labelled(agent_text(labels[j]))} {100 * shares[j]:.3g} %" for j in order]
     yield Fact(head="decides", value={labels[j]: float(shares[j]) for j in order}, note=shorten_list(texts, _SHORT))
     if len(labels) > _ROWS:
         return
     groups: dict[tuple[tuple[int, object], ...], list[str]] = defaultdict(list)
     for k, label in enumerate(labels):
         groups[tuple(who.row(k).items())].append(labelled(agent_text(label)))
-    told = [f"{', '.join(names)} at {_sum(dict(row), labels)}" for row, names in groups.items()]
-    first, *others = told
-    names, _, end = first.partition(" at ")
-    several = len(next(iter(groups.values()))) > 1
-    told = [f"{names} {'end' if several else 'ends'} at {end}", *others]
-    brief = shorten_list(told, _SHORT)
-    yield Fact(head="x(T)", note=", ".join(told), brief=(brief,))
+    told: list[str] = []
+    for row, names in groups.items():
+        verb = "" if told else "end " if len(names) > 1 else "ends "
+        told.append(f"{', '.join(names)} {verb}at {_sum(dict(row), labels)}")
+    yield Fact(head="x(T)", note=", ".join(told), brief=(shorten_list(told, _SHORT),))
 
 
 def _sum(row: dict[int, Any], labels: Sequence[str]) -> str:

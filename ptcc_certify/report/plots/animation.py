@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -72,8 +73,11 @@ def animate(subject: Any, path: str | Path, *, seconds: float = 5, time_unit: st
     if not 0 < seconds <= LONGEST:
         raise ParameterError("seconds", f"= {seconds:g} is not within 0 and {LONGEST}")
     run = _run_of(certificate)
-    figure = plot_glance(certificate, runs=None if isinstance(run, Trajectory) else [run], time_unit=time_unit)
-    write_atomically(path, _film(_Scene(figure, run), kind, seconds))
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from")  # letters of scripts that the font does not have
+        figure = plot_glance(certificate, runs=None if isinstance(run, Trajectory) else [run], time_unit=time_unit)
+        film = _film(_Scene(figure, run), kind, seconds)
+    write_atomically(path, film)
 
 
 def _run_of(certificate: Any) -> Any:
@@ -83,7 +87,7 @@ def _run_of(certificate: Any) -> Any:
     if certificate.graph_proof.graph.n_nodes > LABELLED_NODES:
         raise ParameterError(f"a film shows at most {LABELLED_NODES} agents; draw a figure of these")
     part = certificate.proof.agents
-    if part is None and certificate.initial_state is None:
+    if part is None and (certificate.initial_state is None or certificate.only_drawn):
         raise ParameterError("the certificate holds no initial state to run from; certify with x0")
     return trajectory_of(certificate) if part is None else agents_run(certificate)
 
@@ -100,6 +104,8 @@ class _Scene:
         self.ways = list(positions) if self.in_plane else [np.array([run.t, own]) for own in values]
         self.scale = float(np.abs(values).max()) or 1.0
         self.nodes, self.lines = ({one.get_gid(): one for one in of.lines if one.get_gid()} for of in (graph, ax))
+        for name in [name for name in self.lines if str(name).startswith("end")]:
+            self.lines.pop(name).set_visible(False)  # where agents come to be is not shown before they do
         mark: dict[str, Any] = {"markersize": 4.5, "zorder": 6}
         self.dots = {name: ax.plot([], [], "o", color=one.get_color(), **mark)[0] for name, one in self.lines.items()}
         corner: dict[str, Any] = {"ha": "right", "va": "bottom", "fontsize": 9, "path_effects": HALO, "zorder": 7}

@@ -167,11 +167,11 @@ def name_agents(
     *,
     ends: bool = False,
     until: float | None = None,
-    told: bool = False,
+    told: np.ndarray | None = None,
 ) -> None:
     """Write the names of agents where their lines begin, and where they end if they end apart; show time ``until``.
 
-    If they are ``told``, the values at the ends stand beside the names there. Names take so much room only that the
+    If values are ``told``, (N,), they stand beside the names at the ends. Names take so much room only that the
     time up to ``T`` keeps more than half of the width: longer ones have two lines, or stand at the beginning alone.
     Where nothing changes after ``T``, little of that is shown unless told.
 
@@ -184,14 +184,14 @@ def name_agents(
     names = [shorten_text(printable(run.labels[v]), NAME_LENGTH) for v in agents]
     at_end = values[agents, np.searchsorted(run.t, last * (1 + 1e-12), side="right") - 1]
     digits = 2 - math.floor(math.log10(float(np.abs(np.nan_to_num(values)).max()) or 1.0))  # a run's 1e-9 is 0
-    tails = [f": {round(float(x), digits) + 0.0:.3g}" if told else "" for x in at_end]
+    tails = [""] * len(names) if told is None else [f": {round(float(told[v]), digits) + 0.0:.3g}" for v in agents]
 
     def columns_of(letters: Sequence[int]) -> list[list[tuple[float, float, str, str]]]:
         texts = [_spread(ax, values[agents, 0], names, colours, letters[0])]
         if len(letters) > 1:
             texts.append(_spread(ax, at_end, names, colours, letters[1], tails))
         apart = len({height for height, *_ in texts[-1]}) > 1
-        return texts if told or apart else texts[:1]  # not where all end at the same place
+        return texts if told is not None or apart else texts[:1]  # not where all end at the same place
 
     wide, room, inside = _rooms(ax, (last - first) / ((min(last, _deadline(run)) - first) or 1))
     texts = columns_of([NAME_LENGTH + 8] * (1 + ends))
@@ -200,7 +200,7 @@ def name_agents(
         right = [min(needs[1], max(free / 2, free - needs[0]))] if len(needs) > 1 else []
         letters = [max(3, int(part / text_width("x"))) for part in (free - sum(right), *right)]
         longest = max(map(columns, names))
-        if len(letters) > 1 and not told and min(letters) < max(longest / 2, min(longest, SHORT)):
+        if len(letters) > 1 and told is None and min(letters) < max(longest / 2, min(longest, SHORT)):
             letters = [max(3, int((room - NAME_GAP) / WIDER / text_width("x")))]
         texts = columns_of(letters)
     for side, column in zip((-1, 1), texts, strict=False):
@@ -304,6 +304,10 @@ def _written(names: Sequence[str], tail: str, letters: int) -> str:
         head, rest = _halves(text, letters)
         if columns(text) <= NAME_LENGTH and columns(rest + tail) <= letters:
             break
+    else:
+        if len(names) > 1:
+            text = f"{len(names)} agents"
+            return text + (tail if columns(text + tail) <= letters else tail.replace(" ", "\n"))
     rest = shorten_text(rest, max(letters - columns(tail), 4))
     return f"{head}\n{rest}{tail}" if rest else f"{head}{tail.replace(' ', chr(10))}"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import Any
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from matplotlib import style
@@ -34,12 +34,14 @@ from ptcc_certify.report.text_layout import columns
 from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.family_behaviour import DEPENDS
 
-#: Width and height in inches; how much wider the runs are drawn than the graph.
-SIZE, _RATIO = (7.16, 3.7), 1.35
+#: Width of the figure and height of its panels in inches; how much wider the runs are drawn than the graph.
+_WIDTH, _HIGH, _RATIO = 7.16, 3.0, 1.35
+#: Inches from line to line of the title, and of the words below it.
+_TITLE, _LINE = 0.17, 0.14
 #: Colours of final states, from the least over 0 to the largest: all are legible on white, and white on them.
 ENDS = LinearSegmentedColormap.from_list("ends", ["#A84300", "#6A6A6A", "#005A9C"])
 #: What is told above the panels: the claim as the title, and of each row of heads the first fact that there is.
-_TOLD = (("late", "tracking", "error"), ("input",))
+_TOLD = (("late", "tracking", "error"), ("input",), ("disturbed",))
 #: Colours of a verdict: whether everything asked was proved.
 _GOOD, _DOUBT = "#117733", "#8A5A00"
 #: Characters of an inch of text; of the title, which is larger.
@@ -56,13 +58,14 @@ def plot_glance(subject: Any, *, runs: Sequence[Any] | None = None, words: bool 
     """Draw a certificate at a glance.
 
     Above: the claim, the verdict, and in words how near agents are to where they end, and with what input. Left: who
-    listens to whom, every agent in the colour of its final state - blue above 0, red below, grey at 0 - leaders
+    listens to whom, every agent in the colour of its state at ``T`` - blue above 0, red below, grey at 0 - leaders
     outlined, the second camp as squares. Right: the run of every agent in the same colour, shaded where it is proved to
-    be, with its final state at the end of its line.
+    be, through a reaching phase of the sliding mode by bounds in floats (numerical), with its state at ``T`` at the end
+    of its line: the proved final state, or under limits, with late messages or moving leaders that of the run.
 
-    Above 40 agents the graph is drawn as its matrix, and runs as ranges. Of families the runs are under many signals,
-    of vehicles in the plane their ways are drawn. Where no initial state is known it is what is left of the error from
-    every one, or the graph alone.
+    Above 40 agents the graph is drawn as its matrix, and runs as ranges; above 1,000 no run is made for this. Of
+    families the runs are under many signals, of vehicles in the plane their ways are drawn. Where no initial state is
+    asked for it is what is left of the error from every one, or the graph alone.
 
     Parameters
     ----------
@@ -96,31 +99,56 @@ def plot_glance(subject: Any, *, runs: Sequence[Any] | None = None, words: bool 
         what = type(certificate).__name__
         raise ParameterError(f"a glance is of a certificate, not of {what}; give certify(graph, protocol, x0)")
     with style.context(STYLE):
-        figure = Figure(SIZE if words else (SIZE[0], SIZE[1] - 0.7), layout="constrained")
+        head = _Head.of(certificate) if words else None
+        above = 0.0 if head is None else head.high
+        figure = Figure((_WIDTH, _HIGH + above), layout="constrained")
         panels: Any = figure
-        if words:
-            _, panels = figure.subfigures(2, 1, height_ratios=(_write(figure, certificate), 1))  # type: ignore[misc]
-        ends = _ends(certificate)
-        begins = (
-            certificate.initial_state if certificate.proof.agents is None else certificate.proof.agents.initial_state
-        )
-        if begins is None and not _bounded_for_all(certificate):
+        if head is not None:
+            _, panels = figure.subfigures(2, 1, height_ratios=(above, _HIGH))  # type: ignore[misc]
+            head.write(figure)
+        run = _run_of(certificate, runs)
+        ends = _ends(certificate, run)
+        beside = run is not None or (certificate.of_family and certificate.initial_state is not None)
+        if not beside and not _bounded_for_all(certificate):
             _draw_graph(panels.subfigures(1, 1), certificate, ends)
             return shown(figure)
         left, right = panels.subfigures(1, 2, width_ratios=(1, _RATIO))
         _draw_graph(left, certificate, ends)
-        if begins is None:
+        if beside:
+            _draw_runs(right, certificate, run, ends, runs, time_unit)
+        else:
             _draw_error(new_axes(right), certificate, time_unit)
-        elif ends.size <= REPEATED_NODES or certificate.trajectory is not None:
-            _draw_runs(right, certificate, ends, runs, time_unit)
         return shown(figure)
 
 
-def _ends(certificate: Certificate) -> np.ndarray:
-    """Return the final state of every agent, (N,): of an interval its middle, NaN where none is proved."""
+def _run_of(certificate: Certificate, runs: Sequence[Any] | None) -> Any:
+    """Return the run that is drawn of one graph; None of families, where there is none, and of too many agents."""
     part = certificate.proof.agents
+    if certificate.of_family:
+        return None
+    if part is not None and part.initial_state is None:
+        return None
+    if part is None and (certificate.initial_state is None or certificate.only_drawn):
+        return None  # what is proved is of all initial states
+    if len(certificate.labels) > REPEATED_NODES and certificate.trajectory is None:
+        return None
+    with suppress(SimulationError):
+        return trajectory_of(certificate) if part is None else agents_run(runs[0] if runs else certificate)
+    return None
+
+
+def _ends(certificate: Certificate, run: Any) -> np.ndarray:
+    """Return the state of every agent at ``T``, (N,): of an interval its middle, NaN where none is known.
+
+    It is the proved final state, or under a gain cap, with late messages or moving leaders that of the run.
+    """
+    proof, part = certificate.proof, certificate.proof.agents
+    if part is None and run is not None and (proof.limits or proof.late is not None or proof.leaders_move):
+        return at_deadline(run, run.positions)
     known: list[Any] = []
     if part is not None:  # of agents of order n that of positions; in several dimensions there is no one number
+        if run is not None and part.dimension == 1 and part.protocol.gain_cap is not None:
+            return at_deadline(run, run.states[:, 0, 0])
         known = [agent[0][0][0] for agent in part.final_state or ()] if part.dimension == 1 else []
     elif certificate.of_family:
         ends_of_family = certificate.family_proof.final_positions
@@ -132,6 +160,11 @@ def _ends(certificate: Certificate) -> np.ndarray:
     except OverflowError:
         raise ParameterError("a final state is beyond the range of float64; nothing is drawn of it") from None
     return np.array(ends or [np.nan] * len(certificate.labels))
+
+
+def at_deadline(run: Any, values: np.ndarray) -> np.ndarray:
+    """Return what values of a run, (N, M), are at ``T``, (N,)."""
+    return np.array([np.interp(float(run.protocol.gain.T), run.t, own) for own in values])
 
 
 def colours_of(ends: np.ndarray, largest: float | None = None) -> list[str]:
@@ -147,35 +180,52 @@ def colours_of(ends: np.ndarray, largest: float | None = None) -> list[str]:
     return [to_hex(colour) for colour in ENDS(Normalize(-largest, largest)(np.nan_to_num(ends)))]
 
 
-def _write(figure: Figure, certificate: Certificate) -> float:
-    """Write the claim, the verdict and the bounds above the panels; return the share of the height that they take."""
-    facts = [fact for fact in facts_of(certificate, details=False) if not fact.detail]
-    told = [
-        next(([f for f in facts if f.head == head] for head in heads if any(f.head == head for f in facts)), [])
-        for heads in _TOLD
-    ]
-    told = [sorted(group, key=lambda fact: fact.side == "down")[:2] for group in told]  # what is proved above, first
-    notes = [f"{fact.head}: {_set(spell(fact.note))}" for group in told for fact in group]
-    verdict = certificate.assessment
-    width, high = SIZE
-    room = width - 0.3 - len(verdict.word) / _OF_TITLE
-    claims = [_fitting(fact, int(_OF_TITLE * room)) for fact in facts if fact.head == "claim"]
-    title = textwrap.wrap("; ".join(claims), int(_OF_TITLE * room), max_lines=2, placeholder=" ...")
-    lines = [line for note in notes for line in textwrap.wrap(note, int(_CHARACTERS * width), max_lines=2)]
-    line, below = 0.14, 0.08  # inches
-    top = high - 0.06
-    for number, text in enumerate(title):
-        text = text[:1].upper() + text[1:] if not number else text
-        figure.text(0.012, (top - number * 0.17) / high, text, fontsize=10, weight="bold", va="top", parse_math=False)
-    fine = certificate.verdict == "certified" and verdict.exit_code == 0 and verdict.useful is not False
-    fine = fine and not claims[0].startswith(DEPENDS)
-    mark: dict[str, Any] = {"fontsize": 9, "weight": "bold", "ha": "right", "va": "top"}
-    figure.text(0.988, top / high, verdict.word, color=_GOOD if fine else _DOUBT, **mark)
-    begin = top - 0.17 * len(title) - 0.03
-    for number, text in enumerate(lines):
-        figure.text(0.012, (begin - number * line) / high, text, fontsize=7.5, color="0.25", va="top", parse_math=False)
-    used = high - begin + line * len(lines) + below
-    return used / (high - used)
+class _Head(NamedTuple):
+    """What stands above the panels: the claim, the verdict, and bounds in words."""
+
+    title: list[str]
+    lines: list[str]
+    word: str
+    fine: bool
+
+    @classmethod
+    def of(cls, certificate: Certificate) -> Self:
+        """Return what is told of a certificate."""
+        facts = [fact for fact in facts_of(certificate, details=False) if not fact.detail]
+        (verdict,) = [spell(fact.note) for fact in facts if fact.head == "verdict"]
+        fine = verdict.startswith("certified;") and certificate.assessment.useful is not False
+        notes = [] if fine else [f"verdict: {verdict}"]
+        for heads in _TOLD:
+            group = next(filter(None, ([f for f in facts if f.head == head] for head in heads)), [])
+            first = sorted(group, key=lambda fact: fact.side == "down")[:2]  # what is proved above
+            notes += [f"{fact.head}: {spell(fact.note)}" for fact in first]
+        word = certificate.assessment.word
+        if certificate.verdict == "certified" and not word.startswith("certified"):
+            word = f"asked: {word}"  # the claim itself is proved
+        room = int(_OF_TITLE * (_WIDTH - 0.3 - len(word) / _OF_TITLE))
+        claims = [_fitting(fact, room) for fact in facts if fact.head == "claim"]
+        title = textwrap.wrap("; ".join(claims), room, max_lines=4, placeholder=" ...")
+        lines = [line for note in notes for line in textwrap.wrap(_set(note), int(_CHARACTERS * _WIDTH))]
+        return cls(title, lines, word, fine and not claims[0].startswith(DEPENDS))
+
+    @property
+    def high(self) -> float:
+        """The height in inches."""
+        return 0.2 + _TITLE * len(self.title) + _LINE * len(self.lines)
+
+    def write(self, figure: Figure) -> None:
+        """Write all of it at the top of a figure."""
+        high = float(figure.get_figheight())
+        top = high - 0.06
+        plain: dict[str, Any] = {"va": "top", "parse_math": False}
+        for number, text in enumerate(self.title):
+            text = text[:1].upper() + text[1:] if not number else text
+            figure.text(0.012, (top - number * _TITLE) / high, text, fontsize=10, weight="bold", **plain)
+        mark: dict[str, Any] = {"fontsize": 9, "weight": "bold", "ha": "right", "va": "top"}
+        figure.text(0.988, top / high, self.word, color=_GOOD if self.fine else _DOUBT, **mark)
+        begin = top - _TITLE * len(self.title) - 0.03
+        for number, text in enumerate(self.lines):
+            figure.text(0.012, (begin - number * _LINE) / high, text, fontsize=7.5, color="0.25", **plain)
 
 
 def _fitting(fact: Fact, characters: int) -> str:
@@ -210,21 +260,23 @@ def _draw_graph(panel: SubFigure, certificate: Certificate, ends: np.ndarray) ->
 
 
 def _draw_runs(
-    panel: SubFigure, certificate: Certificate, ends: np.ndarray, runs: Sequence[Any] | None, time_unit: str
+    panel: SubFigure,
+    certificate: Certificate,
+    run: Any,
+    ends: np.ndarray,
+    runs: Sequence[Any] | None,
+    time_unit: str,
 ) -> None:
     """Draw runs within what is proved of them."""
     part, late = certificate.proof.agents, certificate.proof.late
     with suppress(NothingDecays, SimulationError):
         if part is not None and part.dimension == 2:
-            plot_formation(runs[0] if runs else certificate, ax=new_axes(panel))
+            plot_formation(run, ax=new_axes(panel))
         elif certificate.of_family and (late is not None or certificate.proof.leaders_move):
             plot_tracking(certificate, ax=new_axes(panel), time_unit=time_unit)
         elif certificate.of_family:
             plot_trajectory(certificate, ax=new_axes(panel), runs=runs or None, time_unit=time_unit)
-        elif part is None:
-            _draw_run(new_axes(panel), certificate, trajectory_of(certificate), ends, time_unit)
         else:
-            run = agents_run(runs[0] if runs else certificate)
             _draw_run(new_axes(panel), certificate, run, ends, time_unit)
 
 
@@ -248,33 +300,35 @@ def _draw_error(ax: Axes, certificate: Certificate, time_unit: str) -> None:
 
 
 def _draw_run(ax: Axes, certificate: Certificate, run: Any, ends: np.ndarray, time_unit: str) -> None:
-    """Draw the run of every agent of one graph within its tube, with its final state at the end of its line."""
+    """Draw the run of every agent of one graph within its tube, with its state at ``T`` at the end of its line."""
     values = run.positions if isinstance(run, Trajectory) else run.states[:, 0, 0]
     T, colours = float(run.protocol.gain.T), colours_of(ends)
+    ends = np.where(np.isnan(ends), at_deadline(run, values), ends)
     if len(values) > _LINES:
         named = draw_agents(ax, run, values, certificate.graph_proof.structure)
     else:
-        tube = tube_of(certificate.graph_proof, run.t, run.targets) if isinstance(run, Trajectory) else None
+        single = isinstance(run, Trajectory)
+        tube = tube_of(certificate.graph_proof, run.t, run.targets) if single else None
+        # a run that has not settled says nothing of what is from T on
+        proof = certificate.proof
+        ideal = single and not (proof.limits or proof.late is not None or proof.leaders_move)
+        until = run.t < T if ideal and not run.deadline_resolved else run.t >= 0
         for k, colour in enumerate(colours):
             width = 1.3 if len(values) <= _NAMED else 0.8
-            ax.plot(run.t, values[k], color=colour, linewidth=width, gid=node_id(k, "run"))
+            ax.plot(run.t[until], values[k][until], color=colour, linewidth=width, gid=node_id(k, "run"))
             if tube is not None and np.isfinite(tube.low[k]).any():
                 shade: dict[str, Any] = {"alpha": _SHADE / max(5, len(values)), "linewidth": 0}
-                ax.fill_between(run.t, tube.low[k], tube.high[k], color=colour, **shade)
+                ax.fill_between(run.t[until], tube.low[k][until], tube.high[k][until], color=colour, **shade)
         named = dict(enumerate(colours))
+        if tube is not None and not certificate.direct:
+            ax.set_title("shaded: bounds integrated in floats (numerical)", loc="left")
     least, most = float(values.min()), float(values.max())
     room = 0.06 * (most - least) or 1.0
     ax.set_ylim(least - room, most + room)
     ax.axvline(T, color="black", linewidth=0.8, linestyle=":")
-    name_agents(ax, run, values, named, ends=True, until=1.04 * T, told=True)
-    ax.annotate(
-        f"$T$ = {near(run.protocol.gain.T)}",
-        (T, most + room),
-        (-3, -2),
-        textcoords="offset points",
-        ha="right",
-        va="top",
-        fontsize=7,
-    )
-    position = certificate.proof.agents is not None or certificate.proof.velocities is not None
-    finished(ax, time_label("time $t$", time_unit), "position" if position else "state $x_k$")
+    name_agents(ax, run, values, named, ends=True, until=1.04 * T, told=ends)
+    deadline: dict[str, Any] = {"textcoords": "offset points", "ha": "right", "va": "top", "fontsize": 7}
+    ax.annotate(f"$T$ = {near(run.protocol.gain.T)}", (T, most + room), (-3, -2), **deadline)
+    part = certificate.proof.agents
+    name = "state $x_k$" if part is None and certificate.proof.velocities is None else "position"
+    finished(ax, time_label("time $t$", time_unit), f"{name}, coordinate 1" if part and part.dimension > 1 else name)

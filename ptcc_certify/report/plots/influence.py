@@ -16,7 +16,7 @@ from ptcc_certify.report.plots.style import SINGLE_COLUMN, axes_of, finished, st
 from ptcc_certify.report.plots.subject import structure_of
 from ptcc_certify.report.text_layout import printable, shorten_text
 
-#: Colours of weights, from -1 over 0 to 1.
+#: Colours of weights, from the least over 0 to the largest.
 _COLOURS = LinearSegmentedColormap.from_list("weights", ["#A84300", "#FFFFFF", "#005A9C"])
 #: Columns of a name; height of a row in inches, and the least and largest height of a figure.
 _NAME, _ROW, _HEIGHTS = 14, 0.17, (1.8, 7.0)
@@ -70,7 +70,10 @@ def plot_influence(subject: Any, *, ax: Axes | None = None) -> Axes:
     height = float(np.clip(0.9 + _ROW * len(labels), *_HEIGHTS))
     ax = axes_of(ax, (SINGLE_COLUMN[0], height))
     edges = np.arange(len(leaders) + 1) - 0.5, np.arange(len(labels) + 1) - 0.5
-    cells = ax.pcolormesh(*edges, matrix[order], cmap=_COLOURS, vmin=-1, vmax=1, edgecolors="white", linewidth=0.4)
+    most = float(np.abs(matrix).max())
+    cells = ax.pcolormesh(
+        *edges, matrix[order], cmap=_COLOURS, vmin=-most, vmax=most, edgecolors="white", linewidth=0.4
+    )
     ax.invert_yaxis()
     ax.grid(False)
     ax.spines[:].set_visible(False)
@@ -84,16 +87,16 @@ def plot_influence(subject: Any, *, ax: Axes | None = None) -> Axes:
     if named:
         ax.set_yticklabels([labels[k] for k in order], parse_math=False, fontsize=NAME_SIZE)
         if matrix.size <= 12 * LABELLED_NODES and len(leaders) <= 8:
-            _write_weights(ax, matrix[order])
+            _write_weights(ax, matrix[order], most)
     ax.tick_params(length=0)
-    bar = ax.figure.colorbar(cells, ax=ax, shrink=0.7, ticks=[-1, -0.5, 0, 0.5, 1])
+    bar = ax.figure.colorbar(cells, ax=ax, shrink=0.7)
     bar.outline.set_visible(False)  # type: ignore[operator]
     return finished(ax, "whose initial state", "who ends there" if named else f"who ends there ({len(labels)} nodes)")
 
 
-def _write_weights(ax: Axes, matrix: np.ndarray) -> None:
+def _write_weights(ax: Axes, matrix: np.ndarray, most: float) -> None:
     """Write weights into their cells, white on dark ones."""
     for (row, column), weight in np.ndenumerate(matrix):
         if weight:
             text: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 6.5}
-            ax.text(column, row, f"{weight:.2g}", color="white" if abs(weight) > 0.55 else "black", **text)
+            ax.text(column, row, f"{weight:.2g}", color="white" if abs(weight) > 0.55 * most else "black", **text)
