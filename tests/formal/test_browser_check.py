@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from mutations import mutants, resealed
+from side_files import with_side_files
 from verified import program
 
 FORMAL = Path(__file__).resolve().parents[2] / "formal"
@@ -72,6 +73,41 @@ def test_forgeries_are_rejected_as_by_the_executable(page: Any, tmp_path: Path) 
                 assert (code, text) == told(file)
             rejected += code in (1, 2)
     assert rejected >= 15
+
+
+@pytest.mark.browser
+def test_the_answer_is_of_the_file_that_was_given_last(page: Any, tmp_path: Path) -> None:
+    good, bad = CORPUS / "fig3a.json", tmp_path / "\u00e9\u4e2d b.json"
+    data = json.loads(good.read_text(encoding="utf-8"))
+    data["final_state"]["1"] = "9"
+    bad.write_text(json.dumps(resealed(data)), encoding="utf-8")
+    assert told(bad)[0] == 1 and answered(page, bad)[0] == 1
+    assert bad.name in page.locator("#answer h2").text_content()
+    page.evaluate("document.getElementById('answer').className = 'before'")
+    page.set_input_files("#files", [str(good), str(bad)])
+    page.wait_for_function("document.getElementById('answer').className === 'unreadable'")
+    assert "one certificate at a time" in page.locator("#answer").text_content()
+    contents = [good.read_text(encoding="utf-8"), bad.read_text(encoding="utf-8")]
+    page.evaluate("([a, b]) => { check([new File([a], 'a.json')]); check([new File([b], 'b.json')]); }", contents)
+    page.wait_for_function("document.getElementById('answer').className === 'rejected'", timeout=60_000)
+    page.wait_for_timeout(1500)
+    assert page.locator("#answer h2").text_content() == "Rejected: b.json"
+
+
+@pytest.mark.browser
+def test_side_files_are_read_and_asked_for_where_they_are_missing(page: Any, tmp_path: Path) -> None:
+    data, sides = with_side_files(json.loads((CORPUS / "core.json").read_text(encoding="utf-8")))
+    assert sides
+    file = tmp_path / "c.json"
+    file.write_text(json.dumps(data), encoding="utf-8")
+    for name, content in sides.items():
+        (tmp_path / name).write_bytes(content)
+    code, text = answered(page, file)
+    assert code == 2 and "side files are missing" in text and min(sides) in text
+    page.evaluate("document.getElementById('answer').className = 'before'")
+    page.set_input_files("#files", [str(file), *(str(tmp_path / name) for name in sides)])
+    page.wait_for_function(f"{list(CODES)}.includes(document.getElementById('answer').className)", timeout=60_000)
+    assert CODES[page.get_attribute("#answer", "class")] == told(file)[0]
 
 
 @pytest.mark.browser
