@@ -40,7 +40,7 @@ ROOMS = {
     ),
     "batch": ("Many graphs", "batch"),
     "report": ("Pages, statements, figures", "report.explorer"),
-    "examples": ("The examples of the paper", "examples"),
+    "examples": ("Examples of the paper, and of others", "examples examples.published"),
     "errors": ("Errors", "errors"),
 }
 

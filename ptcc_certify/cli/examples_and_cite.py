@@ -24,15 +24,17 @@ def examples(name: str, output: str | None, suffix: str) -> int:
 
     worst and reached are of the simulated run, all else is proved. With -o also every certificate, the figures of the
     paper's Section 4 (and decay and input besides), and the table in full as examples.csv.
+
+    published, or the name of one of them, runs examples of other papers, and tells what is claimed and what is found;
+    with -o a certificate and a figure of each.
     """
     from ptcc_certify.examples import select
+    from ptcc_certify.examples.published import PUBLISHED
 
+    if name == "published" or name in PUBLISHED:
+        return _published(name, output, suffix)
     selection = select(name)
-    if output:
-        try:
-            Path(output).mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise ParameterError(f"{output}: cannot make this folder ({error.strerror})") from None
+    _make(output)
     steps = [f"example {example.number} on {graph}" for example, graph, _ in selection]
     with progress([*steps, "figures"] if output else steps) as begin:
         begin(steps[0])
@@ -51,6 +53,39 @@ def examples(name: str, output: str | None, suffix: str) -> int:
             begin("figures")
             _draw(runs, Path(output), suffix)
     return worst_code([run.certificate.assessment.exit_code for run in runs])
+
+
+def _published(name: str, output: str | None, suffix: str) -> int:
+    """Certify published examples; return 0 if each holds, or fails, as recorded."""
+    from ptcc_certify.examples.published import select_published
+
+    selection = select_published(name)
+    _make(output)
+    recorded = True
+    with progress([entry.name for entry in selection]) as begin:
+        begin(selection[0].name)
+        from ptcc_certify.report.plots.style import save_figure
+        from ptcc_certify.report.published_results import PUBLISHED_HEAD, certify_published
+
+        print_lines(*PUBLISHED_HEAD)
+        for entry in selection:
+            begin(entry.name)
+            found = certify_published(entry)
+            recorded &= found.as_recorded
+            print_lines(*found.lines())
+            if output:
+                found.certificate.save(Path(output) / f"{entry.name}.json")
+                save_figure(found.certificate.plot(), Path(output) / f"{entry.name}.{suffix}")
+    return int(not recorded)
+
+
+def _make(output: str | None) -> None:
+    """Make the folder for what is written."""
+    if output:
+        try:
+            Path(output).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ParameterError(f"{output}: cannot make this folder ({error.strerror})") from None
 
 
 def _save(run: Run, folder: Path) -> None:

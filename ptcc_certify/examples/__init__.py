@@ -105,6 +105,6 @@ def select(name: str) -> list[tuple[Example, str, str]]:
     if not selection:
         numbers = ", ".join(map(str, EXAMPLES))
         raise ParameterError(
-            f'no example "{name}"; use all, {numbers} or {", ".join(GRAPHS)}{did_you_mean(name, GRAPHS)}'
+            f'no example "{name}"; use all, published, {numbers} or {", ".join(GRAPHS)}{did_you_mean(name, GRAPHS)}'
         )
     return selection
