@@ -44,16 +44,16 @@ class Found(NamedTuple):
         >>> from ptcc_certify.examples.published import PUBLISHED
         >>> certify_published(PUBLISHED["french"]).verdict
         'certified, 3 final states as claimed'
-        >>> certify_published(PUBLISHED["leader_misprint"]).verdict
-        'fails as printed: interval bipartite consensus, from ~-7.76 to 12'
+        >>> certify_published(PUBLISHED["leader_other_matrix"]).verdict
+        'not as claimed: interval bipartite consensus, from ~-7.76 to 12'
         """
         if self.certificate.assessment.exit_code:
             if not self.as_recorded:
                 return self.certificate.assessment.text
             states = self._ends().values()
-            return f"fails as printed: {self.entry.fails}, from {near(min(states), 3)} to {near(max(states), 3)}"
+            return f"not as claimed: {self.entry.fails}, from {near(min(states), 3)} to {near(max(states), 3)}"
         if self.misses:
-            return f"fails as printed: {', '.join(self.misses)} end elsewhere"
+            return f"not as claimed: {', '.join(self.misses)} end elsewhere"
         return "certified" + (f", {counted(len(self.entry.ends), 'final state')} as claimed" if self.entry.ends else "")
 
     def _ends(self) -> dict[str, Fraction]:

@@ -25,7 +25,7 @@ def test_every_claim_holds_or_fails_as_recorded(name: str) -> None:
     assert found.as_recorded, found.certificate.assessment.text
     assert found.misses == ()
     assert found.certificate.checked is not None and found.certificate.checked.accepted
-    assert found.verdict.startswith("fails as printed" if found.entry.fails else "certified")
+    assert found.verdict.startswith("not as claimed" if found.entry.fails else "certified")
 
 
 def test_every_entry_says_where_its_numbers_are_from() -> None:
@@ -64,8 +64,8 @@ def test_what_is_not_as_recorded_is_told() -> None:
     certificate = certify_published(PUBLISHED["four_people"]).certificate
     other = Found(PUBLISHED["four_people_second_issue"], certificate)
     assert not other.as_recorded
-    assert other.verdict == "fails as printed: 1, 2, 3, 4 end elsewhere"
-    found = Found(PUBLISHED["leader_misprint"], certificate)
+    assert other.verdict == "not as claimed: 1, 2, 3, 4 end elsewhere"
+    found = Found(PUBLISHED["leader_other_matrix"], certificate)
     assert not found.as_recorded
 
 

@@ -52,7 +52,7 @@ class Published:
     ends : mapping of str to str
         Final states of some nodes, as printed or as the claim has them.
     fails : str or None
-        What is found instead, of an entry that fails as printed.
+        What is found instead, of an entry that not as claimed.
     """
 
     name: str
