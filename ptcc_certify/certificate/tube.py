@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ptcc_certify.errors import ParameterError
-
-if TYPE_CHECKING:
-    from ptcc_certify.certificate.graph_proof import GraphProof
 
 #: By how much ``1 - t/T`` may be larger than what floats make of it.
 _EPSILON = 4 * np.finfo(float).eps
@@ -104,7 +101,7 @@ class Compared:
         return f"Compared({where})"
 
 
-def tube_of(proof: GraphProof, t: Sequence[float] | np.ndarray, targets: np.ndarray | None = None) -> Tube:
+def tube_of(proof: Any, t: Sequence[float] | np.ndarray, targets: np.ndarray | None = None) -> Tube:
     """Return where every agent is proved to be at instants.
 
     With late messages, moving leaders, a gain cap beside these, and of vehicles that exchange virtual positions it is
@@ -114,7 +111,7 @@ def tube_of(proof: GraphProof, t: Sequence[float] | np.ndarray, targets: np.ndar
 
     Parameters
     ----------
-    proof : GraphProof
+    proof : :class:`~ptcc_certify.certificate.graph_proof.GraphProof`
         Of single integrators, or of vehicles that exchange virtual positions.
     t : (M,) array_like
         From 0 on, in units of time.

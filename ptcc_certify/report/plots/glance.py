@@ -48,6 +48,8 @@ _GOOD, _DOUBT = "#117733", "#8A5A00"
 _CHARACTERS, _OF_TITLE = 16.5, 12.5
 #: The least share of the error that is drawn.
 _LEAST = 1e-9
+#: Up to when runs are shown, in units of ``T``.
+_LAST = 1.04
 #: How dark tubes of all agents are together.
 _SHADE = 0.7
 #: Agents of which every one has a line; runs of more are drawn as ranges. Ends that are named.
@@ -322,11 +324,12 @@ def _draw_run(ax: Axes, certificate: Certificate, run: Any, ends: np.ndarray, ti
         named = dict(enumerate(colours))
         if tube is not None and not certificate.direct:
             ax.set_title("shaded: bounds integrated in floats (numerical)", loc="left")
-    least, most = float(values.min()), float(values.max())
+    seen = values[:, run.t <= _LAST * T]
+    least, most = float(seen.min()), float(seen.max())
     room = 0.06 * (most - least) or 1.0
     ax.set_ylim(least - room, most + room)
     ax.axvline(T, color="black", linewidth=0.8, linestyle=":")
-    name_agents(ax, run, values, named, ends=True, until=1.04 * T, told=ends)
+    name_agents(ax, run, values, named, ends=True, until=_LAST * T, told=ends)
     deadline: dict[str, Any] = {"textcoords": "offset points", "ha": "right", "va": "top", "fontsize": 7}
     ax.annotate(f"$T$ = {near(run.protocol.gain.T)}", (T, most + room), (-3, -2), **deadline)
     part = certificate.proof.agents
