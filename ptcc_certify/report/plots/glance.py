@@ -134,9 +134,12 @@ def _run_of(certificate: Certificate, runs: Sequence[Any] | None) -> Any:
         return None  # what is proved is of all initial states
     if len(certificate.labels) > REPEATED_NODES and certificate.trajectory is None:
         return None
-    with suppress(SimulationError):
+    try:
         return trajectory_of(certificate) if part is None else agents_run(runs[0] if runs else certificate)
-    return None
+    except SimulationError:
+        return None
+    except OverflowError:
+        raise ParameterError("a state is beyond the range of float64; nothing is drawn of it") from None
 
 
 def _ends(certificate: Certificate, run: Any) -> np.ndarray:
