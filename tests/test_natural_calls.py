@@ -153,7 +153,7 @@ STUDENT = {
     "cert.plot(what='input')": "Axes",
     "cert.plot('graph')": "Axes",
     "cert.plot('spectrum')": "Axes",
-    "cert.plot('pretty')": "ParameterError: what = 'pretty' is unknown; one of decay, input, graph",
+    "cert.plot('pretty')": "ParameterError: what = 'pretty' is unknown; one of glance, decay, input",
     "cert.trajectory.plot()": "Axes",
     "ptcc.plot_decay('c.json')": "Axes",
     "ptcc.plot_graph(folder / 'c.json')": "Axes",
@@ -283,7 +283,8 @@ FAMILIES = {
         "True"
     ),
     "ptcc.certify(day, p)": "Certificate(bipartite consensus for every signal",
-    "ptcc.certify(day, p).plot()": "ParameterError: the certificate has no initial state; certify the family with x0",
+    "ptcc.certify(day, p).plot()": "Figure",
+    "ptcc.certify(day, p).plot('decay')": "ParameterError: the certificate has no initial state; certify the family",
     "ptcc.certify(day, p, [1, 2]).plot('graph')": "Axes",
     "ptcc.certify(day, p, [1, 2]).plot('spectrum')": "ParameterError: eigenvalues of single graphs do not tell what",
     "ptcc.certify(day, p, [1, 2]).plot('picture')": "ParameterError: what = 'picture' is unknown; one of glance, decay",

@@ -389,9 +389,8 @@ class Design(DesignAnswer):
 def _seen(seen: float, name: str, where: str, peak: Fraction | None) -> Fact:
     """Tell the largest input that was seen, and how far the proved peak is above it."""
     times = f"; proved {float(peak) / seen:.2g} times that" if peak and seen else ""
-    return Fact(
-        head="simulated", value=seen, standing="observed", note=f"{name} up to {seen:.4g}{where} (numerical){times}"
-    )
+    note, brief = (f"{name} up to {seen:.4g}{text} (numerical){times}" for text in (where, ""))
+    return Fact(head="simulated", value=seen, standing="observed", note=note, brief=(brief,))
 
 
 @dataclass(frozen=True, repr=False)

@@ -119,7 +119,9 @@ def draw(
         there["sliding"] = slid and not saved.direct and n <= TRACED_NODES
         there["input"] = n <= TRACED_NODES and (slid or not saved.proof.constant)
     figures = _figures(saved, [name for name in wanted if there.get(name)])
-    if "glance" in wanted and n <= DRAWN_NODES:
+    begins = saved.initial_state if saved.proof.agents is None else saved.proof.agents.initial_state
+    made = run is not None or agents_run is not None or begins is None  # no run is drawn that was not asked for
+    if "glance" in wanted and n <= DRAWN_NODES and made:
         figures |= _glance(saved, [agents_run] if agents_run else None)
     if agents_run is not None and saved.proof.agents is not None:
         figures["motion"] = plot_motion(agents_run)
@@ -166,7 +168,8 @@ def _draw_family(
     if proof.late is not None and proof.late.says_something:
         there["tracking" if proof.late.tracks else "late"] = True
     figures = _figures(saved, [name for name in wanted if there.get(name)], runs)
-    if "glance" in wanted and proof.family.n_nodes <= DRAWN_NODES:
+    made = small or saved.initial_state is None or proof.late is not None
+    if "glance" in wanted and proof.family.n_nodes <= DRAWN_NODES and made:
         figures |= _glance(saved, runs)
     for number, (_, _, component, one) in enumerate(why):
         try:

@@ -394,7 +394,7 @@ def test_messages_that_take_longer_than_the_deadline_are_certified_to_leave_what
 def test_screens_say_first_what_cannot_be_and_then_what_is_left() -> None:
     run = ptcc("certify", "chain.csv", "--delay", "0.02", "--x0", "1,0,2", *QUICK)
     heads = [line.split()[0] for line in run.out.splitlines() if not line.startswith(" ")]
-    assert heads == ["graph", "read", "protocol", "messages", "late", "INPUT", "claim", "x(T)", "verdict"]
+    assert heads == ["verdict", "graph", "read", "protocol", "messages", "late", "INPUT", "claim", "x(T)"]
     words = " ".join(run.out.split())
     assert "late agent c is off its final state at T by" in words
     assert words.index("at least, if none comes sooner") < words.index("every agent within") < words.index("claim")
@@ -642,11 +642,11 @@ def test_page_and_statement_tell_of_late_messages_and_moving_leaders() -> None:
 @pytest.mark.few(0)
 def test_the_figure_that_is_drawn_unasked_is_of_what_the_certificate_claims() -> None:
     assert ptcc("certify", "chain.csv", "--leader-speed", "1", "--x0", "1,0,2", *QUICK, "-o", "l.json").code == 0
-    assert ptcc("plot", "l.json").code == 0 and Path("l-tracking.png").exists()
+    assert ptcc("plot", "l.json").code == 0 and Path("l-glance.png").exists()
     assert ptcc("certify", "chain.csv", "--delay", "0.01", "--x0", "1,0,2", *QUICK, "-o", "m.json").code == 0
-    assert ptcc("plot", "m.json").code == 0 and Path("m-late.png").exists()
+    assert ptcc("plot", "m.json").code == 0 and Path("m-glance.png").exists()
     assert ptcc("certify", "chain.csv", "--delay", "0.01", *QUICK, "-o", "random.json").code == 0
-    assert ptcc("plot", "random.json").code == 0 and Path("random-late.png").exists()
+    assert ptcc("plot", "random.json").code == 0 and Path("random-glance.png").exists()
 
 
 @pytest.mark.few(0)

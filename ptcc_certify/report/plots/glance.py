@@ -110,7 +110,7 @@ def plot_glance(subject: Any, *, runs: Sequence[Any] | None = None, words: bool 
             head.write(figure)
         run = _run_of(certificate, runs)
         ends = _ends(certificate, run)
-        beside = run is not None or (certificate.of_family and certificate.initial_state is not None)
+        beside = run is not None or (certificate.initial_state is not None and _of_bounds(certificate))
         if not beside and not _bounded_for_all(certificate):
             _draw_graph(panels.subfigures(1, 1), certificate, ends)
             return shown(figure)
@@ -134,6 +134,8 @@ def _run_of(certificate: Certificate, runs: Sequence[Any] | None) -> Any:
         return None  # what is proved is of all initial states
     if len(certificate.labels) > REPEATED_NODES and certificate.trajectory is None:
         return None
+    if certificate.proof.late is not None and certificate.asked_trajectory is None:
+        return None  # there is none with what is late, or of leaders that move
     try:
         return trajectory_of(certificate) if part is None else agents_run(runs[0] if runs else certificate)
     except SimulationError:
@@ -148,6 +150,8 @@ def _ends(certificate: Certificate, run: Any) -> np.ndarray:
     It is the proved final state, or under a gain cap, with late messages or moving leaders that of the run.
     """
     proof, part = certificate.proof, certificate.proof.agents
+    if part is None and run is None and proof.leaders_move:
+        return np.full(len(certificate.labels), np.nan)
     if part is None and run is not None and (proof.limits or proof.late is not None or proof.leaders_move):
         return at_deadline(run, run.positions)
     known: list[Any] = []
@@ -165,6 +169,11 @@ def _ends(certificate: Certificate, run: Any) -> np.ndarray:
     except OverflowError:
         raise ParameterError("a final state is beyond the range of float64; nothing is drawn of it") from None
     return np.array(ends or [np.nan] * len(certificate.labels))
+
+
+def _of_bounds(certificate: Certificate) -> bool:
+    """Tell whether runs under many signals are drawn, or bounds alone."""
+    return certificate.of_family or certificate.proof.late is not None
 
 
 def at_deadline(run: Any, values: np.ndarray) -> np.ndarray:
@@ -277,7 +286,7 @@ def _draw_runs(
     with suppress(NothingDecays, SimulationError):
         if part is not None and part.dimension == 2:
             plot_formation(run, ax=new_axes(panel))
-        elif certificate.of_family and (late is not None or certificate.proof.leaders_move):
+        elif run is None and (late is not None or certificate.proof.leaders_move):
             plot_tracking(certificate, ax=new_axes(panel), time_unit=time_unit)
         elif certificate.of_family:
             plot_trajectory(certificate, ax=new_axes(panel), runs=runs or None, time_unit=time_unit)
