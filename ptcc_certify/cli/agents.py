@@ -165,6 +165,11 @@ def agents_flags(options: Options) -> str:
 
 def refuse_agents_of_family(options: Options, verb: str) -> None:
     """Refuse agents of order n where a family of graphs is given, by the options that make them or belong to them."""
+    taken = ("offsets", "biases", "exchange", "v0")  # beside what families take, or advised with it
+    alone = [name for name in _OWN if options[name] is not None and name not in taken]
+    if options["agents"] is None and options["exchange"] is None and alone:  # no agents are advised, to be refused then
+        why = f"is for agents of order n, which families of graphs do not take yet; leave it out, or {verb} one graph"
+        raise ParameterError(f"{declared.flag_of(alone[0])}: {why}")
     agents = agents_of(options)
     if agents is None or (verb == "certify" and agents.virtual):
         return

@@ -23,7 +23,7 @@ KINDS = [
     "late",
     "late-moving",
     "vehicles",
-    "group-vehicles",
+    "late-camps",
     "formation",
     "sliding",
     "single",
@@ -79,7 +79,9 @@ def test_words_say_the_claim_and_the_bounds() -> None:
     assert not plot_glance(certificate("fig3a"), words=False).texts
 
 
-@pytest.mark.parametrize("name", ["no-initial-state", "windows", "family-late", "core", "undecided", "plane"])
+@pytest.mark.parametrize(
+    "name", ["no-initial-state", "group-vehicles", "windows", "family-late", "core", "undecided", "plane"]
+)
 def test_every_kind_has_a_glance(name: str) -> None:
     read = ptcc.read_certificate(CORPUS / f"{name}.json")
     assert plot_glance(read).axes
