@@ -125,7 +125,7 @@ def _coloured(line: str) -> str:
     head, _, text = line.partition(" ")
     if head.lower() not in ("verdict", "accepted", "rejected") or os.environ.get("NO_COLOR"):
         return line
-    said = text.strip() if head.lower() == "verdict" else head
+    said = text.strip().lower() if head.lower() == "verdict" else head
     colour = next((colour for words, colour in _COLOURS.items() if said.startswith(words)), "yellow")
     return click.style(line, fg=colour, bold=True)
 

@@ -12,6 +12,7 @@ from PIL import Image
 
 import ptcc_certify as ptcc
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.animation import animate
 from ptcc_certify.report.plots.glance import ENDS, colours_of, plot_glance
 from ptcc_certify.report.plots.graph import node_id
@@ -102,6 +103,7 @@ def test_a_film_shows_the_run_and_ends_where_it_ends(tmp_path: Path) -> None:
         ("fig3a", "run.gif", 0, "seconds = 0"),
         ("windows", "run.gif", 1, "of one graph"),
         ("core", "run.gif", 1, "at most 40 agents"),
+        ("group-vehicles", "run.gif", 1, "delays are too short"),
     ],
 )
 def test_what_has_no_film_is_told(name: str, file: str, seconds: float, why: str, tmp_path: Path) -> None:
@@ -165,3 +167,13 @@ def test_what_was_asked_is_told_beside_a_claim_that_is_proved(name: str) -> None
 def test_numerical_bounds_are_named() -> None:
     titles = [plot_glance(certificate(name)).axes[1].get_title(loc="left") for name in ("sliding", "sliding-rest")]
     assert titles == ["shaded: bounds integrated in floats (numerical)", ""]
+
+
+@pytest.mark.parametrize(
+    ("name", "coloured"), [("fig3a", True), ("moving", True), ("group-vehicles", False), ("plane", False)]
+)
+def test_the_caption_says_what_colours_tell(name: str, coloured: bool) -> None:
+    read = certificate(name)
+    page = report_html(read if read.proof.agents is not None else read.with_simulation())
+    caption = page.partition('id="figure-glance"')[2].partition("<figcaption>")[2].partition("</figcaption>")[0]
+    assert "Who of" in caption and ("Colours tell" in caption) is coloured

@@ -89,6 +89,10 @@ def _run_of(certificate: Any) -> Any:
     part = certificate.proof.agents
     if part is None and (certificate.initial_state is None or certificate.only_drawn):
         raise ParameterError("the certificate holds no initial state to run from; certify with x0")
+    if part is None and certificate.proof.late is not None and certificate.asked_trajectory is None:
+        raise ParameterError(
+            "no run is made of what was asked: delays are too short for one; draw a figure of the bound"
+        )
     return trajectory_of(certificate) if part is None else agents_run(certificate)
 
 

@@ -150,7 +150,7 @@ def _ends(certificate: Certificate, run: Any) -> np.ndarray:
     It is the proved final state, or under a gain cap, with late messages or moving leaders that of the run.
     """
     proof, part = certificate.proof, certificate.proof.agents
-    if part is None and run is None and proof.leaders_move:
+    if part is None and run is None and (proof.leaders_move or proof.late is not None):
         return np.full(len(certificate.labels), np.nan)
     if part is None and run is not None and (proof.limits or proof.late is not None or proof.leaders_move):
         return at_deadline(run, run.positions)
