@@ -1,4 +1,4 @@
-"""Everything the README shows is run, and shows what it says."""
+"""Everything that the README and the list of all commands show is run, and shows what it says."""
 
 from __future__ import annotations
 
@@ -22,8 +22,14 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+COMMANDS = README.parent / "docs" / "guide" / "commands.md"
 #: Blocks of commands, each run from top to bottom in one folder as a reader would; those that set up are CI's own.
-SESSIONS = [block for _, block in blocks(TEXT, "sh") if "ptcc " in block and "pip install" not in block]
+SESSIONS = [
+    block
+    for text in (TEXT, COMMANDS.read_text(encoding="utf-8") if README.exists() else "")
+    for _, block in blocks(text, "sh")
+    if "ptcc " in block and "pip install" not in block
+]
 #: Commands with a test of their own. The first costs as much as all others: tests/cli, test_all_examples_behave_*; the
 #: second ends at Ctrl-C only: tests/report/test_explorer_page.py, test_ctrl_c_ends_the_explorer_at_once_*; the
 #: third starts a process for each core: tests/batch, test_a_process_that_*; here it runs in this one.
@@ -46,7 +52,7 @@ def test_the_batch_runs(folder: Path):
 
 def test_there_are_commands():
     """Every command of ``ptcc`` is shown, and run above."""
-    shown = {line.split()[1] for block in SESSIONS for line in block.splitlines() if line.startswith("ptcc ")}
+    shown = {line.split()[1] for line in SESSIONS[-1].splitlines() if line.startswith("ptcc ")}
     assert shown == set(cli.commands)
 
 
