@@ -225,10 +225,11 @@ def refuse_dimension(options: Options, command: str) -> None:
         raise ParameterError(f"--dimension: {why}; {mend}")
 
 
-def run_of_agents(case: Case, samples: int, **pattern: Any) -> AgentsTrajectory:
+def run_of_agents(case: Case, samples: int, steps: int | None, **pattern: Any) -> AgentsTrajectory:
     """Run agents of order n with the gains that ``ptcc certify`` proves, from their initial states to the deadline.
 
-    With late messages and moving leaders up to ``T``, messages as old as the ``pattern`` tells.
+    At so many instants or in so many equal steps; with late messages and moving leaders at instants of their own up to
+    ``T``, messages as old as the ``pattern`` tells.
     """
     import numpy as np
 
@@ -241,7 +242,9 @@ def run_of_agents(case: Case, samples: int, **pattern: Any) -> AgentsTrajectory:
 
         x0, v0 = ([float(x) for x in values] for values in (certificate.initial_state, late.vehicles.v0))
         if late.messages.exact and late.leaders is None:
-            motion = virtual_positions.simulate_vehicles(certificate.graph, tracking, x0, v0, samples=samples)
+            motion = virtual_positions.simulate_vehicles(
+                certificate.graph, tracking, x0, v0, samples=samples, steps=steps
+            )
         else:
             beside = certificate.protocol, late.messages, x0, late.leaders
             run = virtual_positions.run_virtual_positions(certificate.graph, *beside, **pattern)
@@ -251,7 +254,7 @@ def run_of_agents(case: Case, samples: int, **pattern: Any) -> AgentsTrajectory:
     part = certificate.agents
     if part is None or (case.graph.n_edges and not part.functions):
         raise ParameterError("no gains of these agents are proved; ptcc certify tells why")
-    return part.simulate(samples=samples)
+    return part.simulate(samples=samples, steps=steps)
 
 
 def read_vectors(text: str, seed: Any, graph: SignedDigraph, dimension: int, name: str) -> Any:

@@ -161,14 +161,14 @@ def _run_agents(graph: str, signed: SignedDigraph, protocol: Protocol, options: 
         limits = [limit for limit in shared.limits_of(options) if limit.stop_before or limit.sample_period]
         beside = {"messages": messages, "leaders": leaders, "limits": limits}
         asks = replace(asks, noise=options["noise"], delta=options["delta"] if leaders is None else None)
-        if (messages or leaders) and source("samples") == ParameterSource.COMMANDLINE:
-            raise ParameterError("--samples: these runs have instants of their own; leave it out")
+        given = [name for name in ("samples", "steps") if source(name) == ParameterSource.COMMANDLINE]
+        if (messages or leaders) and given:
+            raise ParameterError(f"{flag_of(given[0])}: these runs have instants of their own; leave it out")
     else:
         _refuse_messages(options, "agents of order n")
-    for name in ("steps", "boundary_layer"):
-        if options[name] is not None:
-            mend = f"leave it out, or leave out {of_agents.agents_flags(options)}"
-            raise ParameterError(f"{flag_of(name)}: is for single integrators; {mend}")
+    if options["boundary_layer"] is not None:
+        mend = f"leave it out, or leave out {of_agents.agents_flags(options)}"
+        raise ParameterError(f"--boundary-layer: is for single integrators; {mend}")
     if options["kind"] == "nominal" and options["disturbance"] is not None:
         raise ParameterError("--disturbance: agents of order n run without, or under --protocol sliding-mode")
     if source("signal") == ParameterSource.COMMANDLINE:
@@ -177,7 +177,8 @@ def _run_agents(graph: str, signed: SignedDigraph, protocol: Protocol, options: 
     agents, initial = of_agents.agents_and_states(options, signed, certified=of_agents.exchanges_virtual(options))
     begin = replace(initial or InitialState(), sigma0=shared.sigma0_of(protocol, options, signed))
     case = Case(signed, protocol, begin, agents=agents, asks=asks, **beside)
-    return of_agents.run_of_agents(case, options["samples"], pattern=(options["age_pattern"], options["seed"]))
+    pattern = options["age_pattern"], options["seed"]
+    return of_agents.run_of_agents(case, options["samples"], options["steps"], pattern=pattern)
 
 
 def _refuse_messages(options: shared.Options, what: str) -> None:

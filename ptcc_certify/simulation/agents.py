@@ -182,6 +182,7 @@ def simulate_agents(
     *,
     remaining: float = 1e-6,
     samples: int = 101,
+    steps: int | None = None,
     rtol: float = 1e-10,
 ) -> AgentsTrajectory:
     """Integrate agents of order n from their initial states to the deadline.
@@ -198,13 +199,15 @@ def simulate_agents(
         Instants uniform in ``tau`` go from ``1 - t/T = 1`` to this; then comes ``T``.
     samples : int
         So many of these, and as many uniform in ``t``.
+    steps : int, optional
+        Instead: so many equal steps of ``t`` from 0 to ``T``.
     rtol : float
         Of CVODES.
 
     Raises
     ------
     ParameterError
-        ``remaining`` is not between 0 and 1, or ``samples`` below 2.
+        ``remaining`` is not between 0 and 1, ``samples`` are below 2 or ``steps`` below 1.
     SimulationError
         The integrator failed, or there are too many agents.
     """
@@ -214,7 +217,7 @@ def simulate_agents(
     N, d, n = xi.shape
     if N * d * n > MOST_STATES:
         raise SimulationError(f"more than {MOST_STATES} numbers to integrate; simulate fewer agents")
-    t, q, reaching = instants_left(protocol.gain, remaining, samples)
+    t, q, reaching = instants_left(protocol.gain, remaining, samples, steps)
     seen = (q > 0) | (protocol.gain_cap is not None)  # at T itself without a cap the clock is infinite
     h = np.array([[float(x) for x in row] for row in protocol.offsets])
     xi[:, :, 0] -= h
@@ -255,11 +258,22 @@ def _at_deadline(protocol: AgentsProtocol, free: np.ndarray, agreed: bool) -> np
     return last
 
 
-def instants_left(gain: Gain, remaining: float, samples: int) -> Instants:
-    """Return instants: so many uniform in ``tau``, as many in ``t``, and ``T`` itself."""
+def instants_left(gain: Gain, remaining: float, samples: int, steps: int | None = None) -> Instants:
+    """Return instants: so many uniform in ``tau``, as many in ``t``, and ``T``; or those of equal steps.
+
+    Examples
+    --------
+    >>> from ptcc_certify.model.gain import Gain
+    >>> instants_left(Gain(2, 1, 1, 1), 0.1, 201, steps=4).t
+    array([0. , 0.5, 1. , 1.5, 2. ])
+    """
     samples = whole_number(samples, "samples", 2, 100_000)
-    q = np.concatenate([np.geomspace(remaining, 1, samples), np.linspace(remaining, 1, samples), [0.0]])
-    q = np.unique(q)[::-1]
+    if steps is not None:
+        steps = whole_number(steps, "steps", 1, 100_000)
+        q = np.arange(steps, -1, -1) / steps
+    else:
+        q = np.concatenate([np.geomspace(remaining, 1, samples), np.linspace(remaining, 1, samples), [0.0]])
+        q = np.unique(q)[::-1]
     return Instants(float(gain.T) * (1 - q), q, np.zeros(q.size))
 
 

@@ -72,6 +72,7 @@ def simulate_vehicles(
     *,
     remaining: float = 1e-6,
     samples: int = 101,
+    steps: int | None = None,
     rtol: float = 1e-10,
 ) -> AgentsTrajectory:
     """Integrate double integrators that exchange virtual positions, which are heard at once, to the deadline.
@@ -85,13 +86,15 @@ def simulate_vehicles(
         Instants uniform in ``tau`` go from ``1 - t/T = 1`` to this; under a cap then comes ``T``.
     samples : int
         So many of these, and as many uniform in ``t``.
+    steps : int, optional
+        Instead: so many equal steps of ``t`` from 0 to ``T``, which without a cap is left out.
     rtol : float
         Of CVODES.
 
     Raises
     ------
     ParameterError
-        There are too many agents, or ``samples`` are below 2.
+        There are too many agents, ``samples`` are below 2 or ``steps`` below 1.
     SimulationError
         The integrator failed.
 
@@ -107,7 +110,7 @@ def simulate_vehicles(
     if 3 * graph.n_nodes > MOST_STATES:
         raise ParameterError(f"more than {MOST_STATES} numbers to integrate; simulate fewer agents")
     limited = GainLimits(gain_cap=protocol.gain_cap).limit(protocol.gain)
-    instants = instants_left(protocol.gain, remaining, samples)
+    instants = instants_left(protocol.gain, remaining, samples, steps)
     if protocol.gain_cap is None:  # at T itself the gain is infinite
         instants = Instants(*(values[:-1] for values in instants))
     g = _gain_kept(limited, instants.t, instants.remaining)

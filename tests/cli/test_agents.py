@@ -202,7 +202,11 @@ def test_a_simulated_run_has_the_gains_that_certify_proves_under_the_same_method
 @pytest.mark.parametrize(
     ("command", "options", "says"),
     [
-        ("simulate", ("--steps", "5"), "--steps: is for single integrators"),
+        (
+            "simulate",
+            ("--exchange", "virtual", "--gain-cap", "20", "--delay", "0.01", "--steps", "5"),
+            "--steps: these runs have instants of their own",
+        ),
         (
             "simulate",
             ("--boundary-layer", "1", "--protocol", "sliding-mode"),
@@ -398,3 +402,13 @@ def test_runs_of_a_family_and_of_vehicles_in_a_formation_are_of_positions(tmp_pa
         first, *_, last = list(csv.DictReader(io.StringIO(run.out)))
         for k in range(1, 4):  # less their places all begin at 0, where they stay
             assert float(first[str(k)]) == float(last[str(k)]) == k
+
+
+@pytest.mark.parametrize("exchange", ["states", "virtual"])
+def test_equal_steps_are_instants_of_the_same_run(exchange: str):
+    asked = ("simulate", "fig1b", "--agents", "double-integrator", "--v0", "random", "--exchange", exchange)
+    rows = np.genfromtxt(io.StringIO(ptcc(*asked, "--steps", "8").out), delimiter=",", skip_header=1)
+    dense = np.genfromtxt(io.StringIO(ptcc(*asked, "--samples", "2001").out), delimiter=",", skip_header=1)
+    assert np.allclose(rows[:, 0], np.arange(len(rows)) / 8) and len(rows) == (9 if exchange == "states" else 8)
+    for column in range(2, 8):
+        assert np.allclose(rows[:, column], np.interp(rows[:, 0], dense[:, 0], dense[:, column]), atol=1e-3)
