@@ -19,6 +19,19 @@ if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.checker import CheckReport
 
+#: Titles on a long screen, each before facts of these heads; those of others stay where they are.
+_SECTIONS = {
+    "What is asked": ("graph", "family"),
+    "Who leads, what is heard": ("messages", "leaders"),
+    "Where they end": ("claim",),
+    "How fast": ("rate", "why"),
+    "How near, by when": ("error", "deviation"),
+    "What it takes": ("input", "threshold", "effort", "limited"),
+    "Proof": ("simulated", "proof", "note", "time limit"),
+}
+#: The section that keeps what is told of error and input under its own title.
+_WHOLE = "Who leads, what is heard"
+
 
 def short_screen(facts: Iterable[Fact], name: Spelling = str) -> list[str]:
     """Return facts as lines of 80 columns: details left out, and of a text that has shorter ones the first that fits.
@@ -39,14 +52,24 @@ def short_screen(facts: Iterable[Fact], name: Spelling = str) -> list[str]:
 
 
 def long_screen(facts: Iterable[Fact], name: Spelling = str) -> list[str]:
-    """Return all facts as lines, as long as they are.
+    """Return all facts as lines, as long as they are; those of several sections under a title each.
 
     Examples
     --------
-    >>> long_screen([Fact(head="rate", note="2", detail=True)])
+    >>> rate = Fact(head="rate", note="2", detail=True)
+    >>> long_screen([rate])
     ['rate       2']
+    >>> long_screen([Fact(head="claim", note="consensus"), rate])
+    ['', 'Where they end', 'claim      consensus', '', 'How fast', 'rate       2']
     """
-    return format_lines(entries(facts, name))
+    lines, title = [], ""
+    for head, text in entries(facts, name):
+        section = next((section for section, heads in _SECTIONS.items() if head.lower() in heads), title)
+        if section != title and not (title == _WHOLE and section in ("How near, by when", "What it takes")):
+            lines += ["", section]
+            title = section
+        lines += format_lines([(head, text)])
+    return lines[2:] if lines.count("") == 1 and not lines[0] else lines
 
 
 def entries(facts: Iterable[Fact], name: Spelling = str, brief: bool = False) -> Iterator[tuple[str, str]]:
