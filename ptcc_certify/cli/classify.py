@@ -9,7 +9,7 @@ import click
 from ptcc_certify.cli.click_options import Command
 from ptcc_certify.cli.families import classify_family, family_options, read_graph_or_family
 from ptcc_certify.cli.options import expect_option, graphs_argument, json_option, reading_options
-from ptcc_certify.cli.terminal import Screen, print_json, print_lines, screen_options
+from ptcc_certify.cli.terminal import Screen, print_json, print_lines, progress, screen_options
 from ptcc_certify.errors import ExitCode
 
 
@@ -32,10 +32,13 @@ def classify(graph: tuple[str, ...], expect: str | None, as_json: bool, screen: 
     from ptcc_certify.graphs.structure import analyse
     from ptcc_certify.report.facts.of_structure import structure_facts
 
-    given = read_graph_or_family(graph, options)
-    if isinstance(given, Family):
-        return classify_family(graph, given, expect, as_json, screen, options)
-    structure = analyse(given)
+    with progress(("graph", "structure")) as begin:
+        begin("graph")
+        given = read_graph_or_family(graph, options)
+        if isinstance(given, Family):
+            return classify_family(graph, given, expect, as_json, screen, options)
+        begin("structure")
+        structure = analyse(given)
     if as_json:
         from ptcc_certify.certificate.graph_sections import structure_document
 

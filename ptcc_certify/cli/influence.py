@@ -9,7 +9,7 @@ import click
 
 from ptcc_certify.cli.click_options import Command
 from ptcc_certify.cli.options import graph_argument, json_option, read, reading_options
-from ptcc_certify.cli.terminal import FIGURES, Screen, print_json, refuse_output, screen_options
+from ptcc_certify.cli.terminal import FIGURES, Screen, print_json, progress, refuse_output, screen_options
 from ptcc_certify.errors import ExitCode, ParameterError
 
 
@@ -37,12 +37,15 @@ def influence(graph: str, output: str | None, as_json: bool, screen: Screen, **o
     if kind not in (None, ".csv", *FIGURES):
         raise ParameterError(f"{output}: a table is written to .csv, a heat map to {', '.join(FIGURES)}; choose one")
     refuse_output(output)
-    who = influence_of(read(graph, options))
     drawn = None
-    if kind in FIGURES:  # refused, if so, before anything is told
-        from ptcc_certify.report.plots.influence import plot_influence
+    with progress(("who decides whom", "figure")) as begin:
+        begin("who decides whom")
+        who = influence_of(read(graph, options))
+        if kind in FIGURES:  # refused, if so, before anything is told
+            from ptcc_certify.report.plots.influence import plot_influence
 
-        drawn = plot_influence(who)
+            begin("figure")
+            drawn = plot_influence(who)
     if as_json:
         labels, shares = who.structure.graph.labels, who.shares.tolist()
         rows = {label: {labels[j]: str(x) for j, x in who.row(k).items()} for k, label in enumerate(labels)}

@@ -17,7 +17,7 @@ from ptcc_certify.cli import messages_and_leaders as asked
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.click_options import DIMENSION, SIGNAL, Command, click_option, flag_of, one_of
 from ptcc_certify.cli.scenario import BESIDE
-from ptcc_certify.cli.terminal import FIGURES, print_lines, refuse_output
+from ptcc_certify.cli.terminal import FIGURES, print_lines, progress, refuse_output
 from ptcc_certify.errors import ExitCode, ParameterError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.lazy_report import rendered
@@ -117,15 +117,19 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
     if isinstance(signed, Family):
         _refuse_messages(options, "families of graphs")
     elif special:
-        motion = _run_agents(graph[0], signed, protocol, options)
+        with progress(("simulation",)) as begin:
+            begin("simulation")
+            motion = _run_agents(graph[0], signed, protocol, options)
         _write(motion, output, "motion.plot_motion", {"wide": wide, "time_unit": time_unit})
         if protocol.reaching is not None:
             click.echo("note: u is without the sliding terms, which cancel the disturbance", err=True)
         return ExitCode.OK
     if click.get_current_context().get_parameter_source("method") is ParameterSource.COMMANDLINE:
         raise ParameterError("--method: chooses the gains of agents of order n; leave it out, or add --agents")
-    beside = None if isinstance(signed, Family) else _run_beside(graph[0], signed, protocol, options, places)
-    trajectory = beside or _run(signed, protocol, options, places)
+    with progress(("simulation",)) as begin:
+        begin("simulation")
+        beside = None if isinstance(signed, Family) else _run_beside(graph[0], signed, protocol, options, places)
+        trajectory = beside or _run(signed, protocol, options, places)
     _write(trajectory, output, "trajectory.plot_run", {"wide": wide, "time_unit": time_unit})
     if beside is not None:
         return ExitCode.OK
