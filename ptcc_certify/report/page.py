@@ -10,10 +10,12 @@ import math
 import shlex
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from datetime import date
 from fractions import Fraction
 from functools import cache
 from importlib import resources
+from importlib.metadata import PackageNotFoundError, metadata
 from itertools import groupby, islice
 from pathlib import PurePath
 from typing import Any
@@ -209,6 +211,7 @@ def _view(saved: Certificate) -> dict[str, Any]:
         "begins": begins is not None,
         "sampled": any(limits.sample_period is not None for limits in saved.limits),
         "commands": _commands(saved),
+        "documentation": _documentation(),
         "file_name": None if source is None else source.path.name,
         "sha256": None if source is None else source.sha256,
         "document": None if source is None else source.document,
@@ -385,6 +388,16 @@ def _bound_words(saved: Certificate) -> list[Markup]:
         weights = Markup(" with ") + Markup(", ").join(some) + more if some else Markup("")
         lines.append(Markup("{} {}{}").format(name, how, weights))
     return lines
+
+
+def _documentation() -> str:
+    """Return where the documentation stands, as ``pyproject.toml`` names it under ``urls``; empty if it does not."""
+    with suppress(PackageNotFoundError):
+        for entry in metadata("ptcc-certify").get_all("Project-URL") or ():
+            name, _, url = entry.partition(", ")
+            if name == "Documentation":
+                return url.rstrip("/")
+    return ""
 
 
 def _commands(saved: Certificate) -> list[str]:

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import unicodedata
 from datetime import date
+from email.message import Message
 from fractions import Fraction
 from functools import cache
 from html.parser import HTMLParser
@@ -348,6 +349,20 @@ def test_what_a_certificate_does_not_say_is_said():
     assert "sampled and held" in nominal and "Sampling is certified with the periods" in caveats("initial_set")
     assert "\u03b4 must be known" in caveats("sliding") and "No initial state was given" in caveats("no start")
     assert "article leaves disconnected graphs out" in caveats("disconnected")
+
+
+@pytest.mark.usefixtures("framed_figures")
+def test_the_page_links_to_the_checker_in_the_browser_where_the_documentation_has_an_address(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    told = Message()
+    for url in ("Source, https://example.org/source", "Documentation, https://example.org/ptcc/"):
+        told["Project-URL"] = url
+    for known, shown in ((Message(), "file onto the page check.html of the"), (told, "page check.html")):
+        monkeypatch.setattr("ptcc_certify.report.page.metadata", lambda _, known=known: known)
+        page = reported(example("nominal"), tmp_path, simulation=False)
+        assert shown in plain(page)
+        assert ('<a href="https://example.org/ptcc/check.html">the page check.html</a>' in page) is (known is told)
 
 
 @pytest.mark.few(0)
