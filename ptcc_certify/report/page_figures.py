@@ -51,6 +51,8 @@ PLOTS: dict[str, Callable[..., Any]] = {
     "final": plot_final_states,
     "degrees": lambda saved: plot_degrees(saved.graph),
 }
+#: What the glance for narrow screens is called.
+NARROW = "glance-narrow"
 #: Agents of order n up to which a run is drawn.
 _RUN = 60
 #: What is refuted, the counterexample in words, its component, and itself.
@@ -141,9 +143,10 @@ def _figures(saved: Certificate, names: Sequence[str], runs: Sequence[Trajectory
 
 
 def _glance(saved: Certificate, runs: Sequence[Any] | None) -> dict[str, Any]:
-    """Draw a certificate at a glance, unless it or its run is beyond floats."""
+    """Draw a certificate at a glance, for wide screens and narrow ones, unless it or its run is beyond floats."""
     with suppress(ParameterError, SimulationError):
-        return {"glance": plot_glance(saved, words=False, runs=runs)}
+        both = {"glance": False, NARROW: True}
+        return {name: plot_glance(saved, words=False, runs=runs, stacked=stacked) for name, stacked in both.items()}
     return {}
 
 
@@ -205,8 +208,16 @@ def _beside(late: LateBounds | None, protocol: Protocol) -> dict[str, bool]:
     return {"tracking": True} if late.tracks else {"late": can_run(protocol, late.messages)}
 
 
-def inline_figure(figure: Figure, name: str, caption: Markup) -> Markup:
-    """Return a figure as inline SVG, which a caption of HTML describes in words and numbers."""
+def inline_figure(figure: Figure, name: str, caption: Markup, narrow: Figure | None = None) -> Markup:
+    """Return a figure as inline SVG, which a caption of HTML describes in words and numbers; on phones a narrow one."""
+    both = [_svg(figure, name, caption)] + ([] if narrow is None else [_svg(narrow, NARROW, caption)])
+    return Markup('<figure id="figure-{}">{}<figcaption>{}</figcaption></figure>').format(
+        name, Markup("").join(both), caption
+    )
+
+
+def _svg(figure: Figure, name: str, caption: Markup) -> Markup:
+    """Return a figure as inline SVG of a class."""
     image = figure_bytes(figure, ".svg").decode()
     image = re.sub(r"<!--.*?-->|<metadata>.*?</metadata>|<style.*?</style>", "", image, flags=re.DOTALL)
     # the figures of a page share its names, so each puts its own before them
@@ -215,6 +226,6 @@ def inline_figure(figure: Figure, name: str, caption: Markup) -> Markup:
     image = re.sub(r' d="[^"]*"', lambda d: re.sub(r"(\.\d{3})\d+", r"\1", d[0]), image)  # a smaller page
     frame = re.search(r'<svg[^>]*viewBox="([-0-9. ]+)"[^>]*>', image)
     assert frame is not None
-    return Markup(
-        '<figure id="figure-{}"><svg viewBox="{}" role="img" aria-label="{}">{}<figcaption>{}</figcaption></figure>'
-    ).format(name, frame[1], caption.striptags(), Markup(image[frame.end() :].strip()), caption)
+    return Markup('<svg class="{}" viewBox="{}" role="img" aria-label="{}">{}').format(
+        name, frame[1], caption.striptags(), Markup(image[frame.end() :].strip())
+    )

@@ -26,6 +26,7 @@ from ptcc_certify.report.plots.distributions import plot_final_states
 from ptcc_certify.report.plots.graph import node_id, plot_graph
 from ptcc_certify.report.plots.graph_labels import INSIDE
 from ptcc_certify.report.plots.motion import agents_run, plot_formation
+from ptcc_certify.report.plots.sizes import DOUBLE_COLUMN, SINGLE_COLUMN, current_sizes
 from ptcc_certify.report.plots.style import BOUND, STYLE, finished, legend_columns, new_axes, shown, time_label
 from ptcc_certify.report.plots.subject import read_back, trajectory_of
 from ptcc_certify.report.plots.tracking import plot_tracking
@@ -34,8 +35,10 @@ from ptcc_certify.report.text_layout import columns
 from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.family_behaviour import DEPENDS
 
-#: Width of the figure and height of its panels in inches; how much wider the runs are drawn than the graph.
-_WIDTH, _HIGH, _RATIO = 7.16, 3.0, 1.35
+#: Height of the panels in inches, and how much wider the runs are drawn than the graph.
+_HIGH, _RATIO = 3.0, 1.35
+#: Inches below which one stands above the other; their heights, and what each agent beyond eight adds for its names.
+_NARROW, _STACKED, _MORE = 5.0, (2.7, 2.5), 0.11
 #: Inches from line to line of the title, and of the words below it.
 _TITLE, _LINE = 0.17, 0.14
 #: Colours of final states, from the least over 0 to the largest: all are legible on white, and white on them.
@@ -56,7 +59,14 @@ _SHADE = 0.7
 _LINES, _NAMED = LABELLED_NODES, 12
 
 
-def plot_glance(subject: Any, *, runs: Sequence[Any] | None = None, words: bool = True, time_unit: str = "") -> Figure:
+def plot_glance(
+    subject: Any,
+    *,
+    runs: Sequence[Any] | None = None,
+    words: bool = True,
+    time_unit: str = "",
+    stacked: bool | None = None,
+) -> Figure:
     """Draw a certificate at a glance.
 
     Above: the claim, the verdict, and in words how near agents are to where they end, and with what input. Left: who
@@ -78,6 +88,8 @@ def plot_glance(subject: Any, *, runs: Sequence[Any] | None = None, words: bool 
         Whether claim, verdict and bounds stand above.
     time_unit : str
         Of the deadline, for the label of the axis.
+    stacked : bool, optional
+        Whether runs stand below the graph; by default where figures are made narrower than 5 inches.
 
     Returns
     -------
@@ -100,21 +112,28 @@ def plot_glance(subject: Any, *, runs: Sequence[Any] | None = None, words: bool 
     if not isinstance(certificate, Certificate):
         what = type(certificate).__name__
         raise ParameterError(f"a glance is of a certificate, not of {what}; give certify(graph, protocol, x0)")
+    stacked = current_sizes().widths[1] < _NARROW if stacked is None else stacked
     with style.context(STYLE):
-        head = _Head.of(certificate) if words else None
+        run = _run_of(certificate, runs)
+        beside = run is not None or (certificate.initial_state is not None and _of_bounds(certificate))
+        alone = not beside and not _bounded_for_all(certificate)
+        rows = _STACKED[0], _STACKED[1] + _MORE * max(0, min(len(certificate.labels), _LINES) - 8)
+        width, high = (SINGLE_COLUMN[0], rows[0] if alone else sum(rows)) if stacked else (DOUBLE_COLUMN[0], _HIGH)
+        head = _Head.of(certificate, width) if words else None
         above = 0.0 if head is None else head.high
-        figure = Figure((_WIDTH, _HIGH + above), layout="constrained")
+        figure = Figure((width, high + above), layout="constrained")
         panels: Any = figure
         if head is not None:
-            _, panels = figure.subfigures(2, 1, height_ratios=(above, _HIGH))  # type: ignore[misc]
+            _, panels = figure.subfigures(2, 1, height_ratios=(above, high))  # type: ignore[misc]
             head.write(figure)
-        run = _run_of(certificate, runs)
         ends = _ends(certificate, run)
-        beside = run is not None or (certificate.initial_state is not None and _of_bounds(certificate))
-        if not beside and not _bounded_for_all(certificate):
+        if alone:
             _draw_graph(panels.subfigures(1, 1), certificate, ends)
             return shown(figure)
-        left, right = panels.subfigures(1, 2, width_ratios=(1, _RATIO))
+        if stacked:
+            left, right = panels.subfigures(2, 1, height_ratios=rows)
+        else:
+            left, right = panels.subfigures(1, 2, width_ratios=(1, _RATIO))
         _draw_graph(left, certificate, ends)
         if beside:
             _draw_runs(right, certificate, run, ends, runs, time_unit)
@@ -201,13 +220,14 @@ class _Head(NamedTuple):
     lines: list[str]
     word: str
     fine: bool
+    beside: bool
 
     @classmethod
-    def of(cls, certificate: Certificate) -> Self:
-        """Return what is told of a certificate."""
+    def of(cls, certificate: Certificate, width: float) -> Self:
+        """Return what is told of a certificate, in lines for so many inches."""
         facts = [fact for fact in facts_of(certificate, details=False) if not fact.detail]
         (verdict,) = [spell(fact.note) for fact in facts if fact.head == "verdict"]
-        fine = verdict.startswith("certified;") and certificate.assessment.useful is not False
+        fine = verdict.partition(";")[0] == "certified" and certificate.assessment.useful is not False
         notes = [] if fine else [f"verdict: {verdict}"]
         for heads in _TOLD:
             group = next(filter(None, ([f for f in facts if f.head == head] for head in heads)), [])
@@ -216,16 +236,17 @@ class _Head(NamedTuple):
         word = certificate.assessment.word
         if certificate.verdict == "certified" and not word.startswith("certified"):
             word = f"asked: {word}"  # the claim itself is proved
-        room = int(_OF_TITLE * (_WIDTH - 0.3 - len(word) / _OF_TITLE))
+        beside = width > _NARROW  # the verdict stands beside the title, or below it
+        room = int(_OF_TITLE * (width - (0.3 + len(word) / _OF_TITLE if beside else 0)))
         claims = [_fitting(fact, room) for fact in facts if fact.head == "claim"]
-        title = textwrap.wrap("; ".join(claims), room, max_lines=4, placeholder=" ...")
-        lines = [line for note in notes for line in textwrap.wrap(_set(note), int(_CHARACTERS * _WIDTH))]
-        return cls(title, lines, word, fine and not claims[0].startswith(DEPENDS))
+        title = textwrap.wrap(_set("; ".join(claims)), room, max_lines=4, placeholder=" ...")
+        lines = [line for note in notes for line in textwrap.wrap(_set(note), int(_CHARACTERS * width))]
+        return cls(title, lines, word, fine and not claims[0].startswith(DEPENDS), beside)
 
     @property
     def high(self) -> float:
         """The height in inches."""
-        return 0.2 + _TITLE * len(self.title) + _LINE * len(self.lines)
+        return 0.2 + _TITLE * (len(self.title) + (not self.beside)) + _LINE * len(self.lines)
 
     def write(self, figure: Figure) -> None:
         """Write all of it at the top of a figure."""
@@ -235,9 +256,11 @@ class _Head(NamedTuple):
         for number, text in enumerate(self.title):
             text = text[:1].upper() + text[1:] if not number else text
             figure.text(0.012, (top - number * _TITLE) / high, text, fontsize=10, weight="bold", **plain)
-        mark: dict[str, Any] = {"fontsize": 9, "weight": "bold", "ha": "right", "va": "top"}
-        figure.text(0.988, top / high, self.word, color=_GOOD if self.fine else _DOUBT, **mark)
-        begin = top - _TITLE * len(self.title) - 0.03
+        begin = top - _TITLE * len(self.title)
+        x, y = (0.988, top) if self.beside else (0.012, begin)
+        mark: dict[str, Any] = {"fontsize": 9, "weight": "bold", "ha": "right" if self.beside else "left", "va": "top"}
+        figure.text(x, y / high, self.word, color=_GOOD if self.fine else _DOUBT, **mark)
+        begin -= 0.03 if self.beside else _TITLE + 0.03
         for number, text in enumerate(self.lines):
             figure.text(0.012, (begin - number * _LINE) / high, text, fontsize=7.5, color="0.25", **plain)
 
