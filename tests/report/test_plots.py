@@ -1338,6 +1338,18 @@ def inflated(stream: bytes) -> bytes:
         return b""
 
 
+def test_nothing_is_cut_off_a_figure_that_is_drawn_smaller(tmp_path: Path) -> None:
+    run, path, drawn = certified("fig3b").trajectory, tmp_path / "a.pdf", []
+    for purpose in ("ieee", "nature"):
+        figure = plot_run(run)
+        with figures_for(purpose):
+            save_figure(figure, path)
+        streams = re.findall(rb"stream\r?\n(.*?)\r?\nendstream", path.read_bytes(), re.DOTALL)
+        page = max(map(inflated, streams), key=len)
+        drawn.append([page.count(operator) for operator in (b" l\n", b" m\n", b" Do\n", b" re\n")])
+    assert drawn[0] == drawn[1] and drawn[0][0] > 100
+
+
 def test_states_have_their_unit_on_every_axis_of_theirs() -> None:
     cert = certified("sliding")
     with figures_for(state_unit="m"):

@@ -146,6 +146,7 @@ def _scaled_pdf(buffer: io.BytesIO, scale: float, metadata: Any) -> Any:
     class Scaled(PdfFile):
         def newPage(self, width: float, height: float) -> None:
             super().newPage(scale * width, scale * height)
+            self.width, self.height = width, height  # paths are cut there before they are scaled
             self.output(scale, 0, 0, scale, 0, 0, Op.concat_matrix)
 
     pages: Any = PdfPages(buffer, metadata=metadata)
