@@ -47,6 +47,8 @@ HEADS |= dict.fromkeys(("constant", "dwell", "shares", "windows"), "If signals a
 HEADS |= {"effort": "Size of the input", "claim": "What they do"}
 
 _MINUS = "\N{MINUS SIGN}"
+#: An exponent in brackets, with up to two more pairs inside.
+EXPONENT = re.compile(r"\^\(((?:[^()]|\((?:[^()]|\([^()]*\))*\))*)\)")
 #: Units of a formula's drawing in the size of its letters.
 _EM = 200
 #: Greek letters by the names that a screen gives them.
@@ -148,10 +150,10 @@ def _near(x: Fraction) -> Markup:
 def power(text: str) -> Markup:
     """Write ``3e-07`` as a product with a power of ten, and a true minus sign."""
     mantissa, _, exponent = text.partition("e")
-    product = (
-        Markup("{}\u00a0\u00d7\u00a010<sup>{}</sup>").format(mantissa, int(exponent)) if exponent else Markup(mantissa)
-    )
-    return product.replace("-", _MINUS)
+    ten = Markup("10<sup>{}</sup>").format(int(exponent or 0))
+    if exponent and mantissa != "1":
+        ten = Markup("{}\u00a0\u00d7\u00a0").format(mantissa) + ten
+    return (ten if exponent else Markup(mantissa)).replace("-", _MINUS)
 
 
 def above(x: Fraction | float, digits: int = 4) -> Markup:
@@ -197,15 +199,26 @@ def signs(text: str) -> str:
 
 
 def typeset(text: str) -> Markup:
-    """Set what a screen writes in ASCII: ``||E|| <= 2e-07``, ``lmin(Xi_F)``, ``rho2``."""
+    r"""Set what a screen writes in ASCII: ``||E|| <= 2e-07``, ``lmin(Xi_F)``, ``rho2``, powers.
+
+    Examples
+    --------
+    >>> print(typeset("int ||u||^2 dt <= 3e+04"), typeset("V <= e^(-rate (s - s(T_r))) V(0) at T(1-1e-6)"), sep=chr(10))
+    \u222b \u2016u\u2016<sup>2</sup> dt \u2264 3\xa0\xd7\xa010<sup>4</sup>
+    V \u2264 e<sup>\u2212rate (s \u2212 s(T<sub>r</sub>))</sup> V(0) at T(1\u221210<sup>\u22126</sup>)
+    """
     text = re.sub(r"\b[A-Za-z]+(?![A-Za-z])", lambda word: LETTERS.get(word[0], word[0]), text)
     text = re.sub(r"(?<=[\u03c1\u03bc])(?=\d)", "_", text)
     text = re.sub(r"(?<=L)'|(?<=L_F)'", "\u2032", text)
     for plain, sign in ((" <= ", " \u2264 "), (" >= ", " \u2265 "), ("||", "\u2016")):  # a label may be ">"
         text = text.replace(plain, sign)
+    text = re.sub(r"\bint (?=\u2016)", "\N{INTEGRAL} ", text)
     text = re.sub(r"(?<=\d) (?=T)", "\u00a0", text)  # the name of an instant is not broken
+    text = re.sub(r"\b(T\(1)-", rf"\1{_MINUS}", text)
     shown = re.sub(r"\bl(min|max)(?=\()", "\u03bb<sub>\\1</sub>", str(indexed(text)))
-    return Markup(re.sub(r"\b[\d.]+e[+-]?\d+\b", lambda number: str(power(number[0])), shown))
+    shown = re.sub(r"\b[\d.]+e[+-]?\d+\b", lambda number: str(power(number[0])), shown)
+    shown = EXPONENT.sub(lambda exponent: f"<sup>{exponent[1].replace('-', _MINUS)}</sup>", shown)
+    return Markup(re.sub(r"\^(\d)", r"<sup>\1</sup>", shown))
 
 
 @lru_cache(maxsize=256)

@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from ptcc_certify.errors import Sentence, spell
 from ptcc_certify.model.casadi_latex import symbol_latex
-from ptcc_certify.report.html_text import LETTERS, as_parameters, labels_apart
+from ptcc_certify.report.html_text import EXPONENT, LETTERS, as_parameters, labels_apart
 from ptcc_certify.report.text_layout import NO_BREAK
 
 _TEX = {c: f"\\{c}" for c in "{}$&#%_"}
@@ -26,7 +26,6 @@ _TOKEN = re.compile(
     r"(?P<mantissa>\b\d[\d.]*)e(?P<exponent>[+-]?\d+)|[A-Za-z]+(?:\d|_\w+)?|\|\||<=|>=|->|[_%{}]",
 )
 _ROOT = re.compile(r"\\sqrt (\S+)")
-_EXPONENT = re.compile(r"\^\(((?:[^()]|\((?:[^()]|\([^()]*\))*\))*)\)")
 #: What ends a formula.
 _STOPS = (",", ";", ":", ".")
 #: Words that are formulas: numbers and signs; letters other than the article, and Greek ones by their names.
@@ -116,7 +115,7 @@ def _in_math(text: str) -> str:
     joined = words[0]
     for last, word in pairwise(words):
         joined += f" {word}" if {last, word} & _SPACED or last.endswith(",") else rf"\, {word}"
-    return _ROOT.sub(r"\\sqrt{\1}", _EXPONENT.sub(r"^{\1}", joined))
+    return _ROOT.sub(r"\\sqrt{\1}", EXPONENT.sub(r"^{\1}", joined))
 
 
 def _token(match: re.Match[str]) -> str:
