@@ -13,7 +13,7 @@ from ptcc_certify.examples.published import Published
 from ptcc_certify.model.asks import Asks
 
 #: The head of the table that ``ptcc examples published`` prints; its rows are of :meth:`Found.lines`.
-PUBLISHED_HEAD = (f"{'published':<26}{'claim':<21}found", f"{'':<4}paper")
+PUBLISHED_HEAD = (f"{'published':<26}{'claim':<29}found", f"{'':<4}paper")
 
 
 class Found(NamedTuple):
@@ -57,7 +57,18 @@ class Found(NamedTuple):
         return "certified" + (f", {counted(len(self.entry.ends), 'final state')} as claimed" if self.entry.ends else "")
 
     def _ends(self) -> dict[str, Fraction]:
-        """Return the final state of every node."""
+        """Return the final state of every node; where the topology switches, of those with one for all signals.
+
+        Examples
+        --------
+        >>> from ptcc_certify.examples.published import PUBLISHED
+        >>> certify_published(PUBLISHED["noisy"])._ends()["1"]
+        Fraction(4, 15)
+        """
+        if self.certificate.of_family:
+            ends = self.certificate.family_proof.final_state
+            pairs = () if ends is None else zip(ends.labels, ends, strict=True)
+            return {label: pair[0] for label, pair in pairs if pair is not None and pair[0] == pair[1]}
         final = self.certificate.graph_proof.final_state
         assert final is not None
         return {str(node): Fraction(state) for node, state in zip(final.labels, final.states, strict=True)}
@@ -69,12 +80,12 @@ class Found(NamedTuple):
         --------
         >>> from ptcc_certify.examples.published import PUBLISHED
         >>> print(*certify_published(PUBLISHED["managers"]).lines(), sep=chr(10))
-        managers                  consensus            certified
+        managers                  consensus                    certified
             D. Krackhardt: Cognitive social structures, doi:10.1016/0378-8733(87)90009-8
         """
         entry = self.entry
         paper = shorten(entry.paper, 76, placeholder=" ...") + (f", doi:{entry.doi}" if entry.doi else "")
-        return f"{entry.name:<26}{entry.behaviour:<21}{self.verdict}", f"{'':<4}{paper}"
+        return f"{entry.name:<26}{entry.behaviour:<29}{self.verdict}", f"{'':<4}{paper}"
 
 
 def certify_published(entry: Published) -> Found:

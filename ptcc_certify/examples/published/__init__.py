@@ -94,6 +94,8 @@ class Published:
     def misses(self, ends: Mapping[str, Fraction]) -> tuple[str, ...]:
         """Return the nodes whose final states are not the claimed ones, rounded as these are; fractions are exact.
 
+        A node without a final state is one of them.
+
         Examples
         --------
         >>> entry = PUBLISHED["four_people"]
@@ -102,7 +104,11 @@ class Published:
         >>> entry.misses({"1": Fraction("60.02"), "2": Fraction("59.4"), "3": Fraction(75), "4": Fraction(75)})
         ('2',)
         """
-        return tuple(node for node, text in (self.ends or {}).items() if abs(ends[node] - Fraction(text)) > _half(text))
+        return tuple(
+            node
+            for node, text in (self.ends or {}).items()
+            if node not in ends or abs(ends[node] - Fraction(text)) > _half(text)
+        )
 
 
 def _half(text: str) -> Fraction:
