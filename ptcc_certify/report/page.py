@@ -27,11 +27,13 @@ from lmi.exact.decimal_rounding import counted
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certificate_file import RejectedCertificate
 from ptcc_certify.certificate.constrained_switching.bounds import nearer_for_signal
+from ptcc_certify.certificate.fact import Fact
 from ptcc_certify.certificate.runs_against_bounds import compare
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.obligations import VerifiedObligation
 from ptcc_certify.errors import Change, Sentence, spell
 from ptcc_certify.graphs.io.graph_files import reading_flags
+from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.model.agents import plant_text
 from ptcc_certify.report import html_text as texts
 from ptcc_certify.report.facts.agents import claimed_of
@@ -45,6 +47,7 @@ from ptcc_certify.report.html_text import rational
 from ptcc_certify.report.page_figures import Counterexamples, counterexamples, draw, inline_figure, run_of_agents
 from ptcc_certify.report.page_states_table import ROWS, states_table
 from ptcc_certify.report.plots.runs_under_signals import keeps_promise
+from ptcc_certify.report.plots.sizes import PAGE, sized
 from ptcc_certify.report.plots.subject import ideal_text, limits_text
 from ptcc_certify.report.text_layout import arithmetic
 from ptcc_certify.simulation.agents import AgentsTrajectory
@@ -56,6 +59,7 @@ from ptcc_certify.theorems.table import THEOREMS
 _WEIGHTS = 8
 #: Facts of the question, and those that stand elsewhere on the page.
 _QUESTION = ["graph", "family", "read", "nodes", "mode", "structure", "protocol", "x(0)", "offsets", "v(0)", "sigma(0)"]
+_QUESTION += ["messages", "leaders"]
 _ELSEWHERE = ("verdict", "proof")
 #: The theorem of families, as page and statement give it.
 THEOREM = (
@@ -108,8 +112,11 @@ def report_html(
     own = _of_family(saved, why) if saved.of_family else _of_graph(saved)
     view = _view(saved) | own | _runs(saved, runs, run)
     more: dict[str, Any] = {"no_run": no_run, "why": why, "obligations": [] if report is None else _obligations(report)}
-    more["figures"] = draw(saved, None, runs, why, run)
-    return _environment().get_template("page.html").render(view | _written(day) | more)
+    with sized(PAGE):
+        more["figures"] = draw(saved, None, runs, why, run)
+        late = more["figures"].get("late")
+        more["missed"] = late is not None and any(line.get_marker() == "v" for line in late.axes[0].lines)
+        return _environment().get_template("page.html").render(view | _written(day) | more)
 
 
 def rejected_html(error: RejectedCertificate, *, day: date | None = None) -> str:
@@ -159,6 +166,7 @@ def _environment() -> jinja2.Environment:
     }
     style = (resources.files("ptcc_certify.report") / "page.css").read_text(encoding="utf-8")
     environment.globals |= {"style": Markup(style), "inline_figure": inline_figure, "newline": Markup("\n")}
+    environment.globals["labelled_nodes"] = LABELLED_NODES
     return environment
 
 
@@ -200,8 +208,8 @@ def _view(saved: Certificate) -> dict[str, Any]:
         "verdict_text": set_note(facts[-1].note),
         "larger_rho2": advised if "leaves 1 %" in spell(assessment.advice) else "",
         "arithmetic": arithmetic(saved.direct),
-        "answers": [(head, list(each)) for head, each in groupby(answers, lambda fact: fact.head)],
-        **{"asked": asked, "details": details, "lacks": lacks},
+        "answers": _by_head(answers),
+        **{"asked": asked, "details": _by_head(details), "lacks": lacks},
         "graph_text": set_note(facts[0].note),
         "beside_law": beside_law(saved),
         "equations": texts.formula_svg(protocol_latex(saved), inline=False),
@@ -388,6 +396,11 @@ def _bound_words(saved: Certificate) -> list[Markup]:
         weights = Markup(" with ") + Markup(", ").join(some) + more if some else Markup("")
         lines.append(Markup("{} {}{}").format(name, how, weights))
     return lines
+
+
+def _by_head(facts: Sequence[Fact]) -> list[tuple[str, list[Fact]]]:
+    """Return facts by their heads, in the order in which these stand."""
+    return [(head, list(each)) for head, each in groupby(facts, lambda fact: fact.head)]
 
 
 def _documentation() -> str:

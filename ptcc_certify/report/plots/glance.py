@@ -37,6 +37,8 @@ from ptcc_certify.theorems.family_behaviour import DEPENDS
 
 #: Height of the panels in inches, and how much wider the runs are drawn than the graph.
 _HIGH, _RATIO = 3.0, 1.35
+#: Inches that panels have on a slide, however long the words above them are.
+_LEAST_HIGH = 2.0
 #: Inches below which one stands above the other; their heights, and what each agent beyond eight adds for its names.
 _NARROW, _STACKED, _MORE = 5.0, (2.7, 2.5), 0.11
 #: Inches from line to line of the title, and of the words below it.
@@ -112,15 +114,19 @@ def plot_glance(
     if not isinstance(certificate, Certificate):
         what = type(certificate).__name__
         raise ParameterError(f"a glance is of a certificate, not of {what}; give certify(graph, protocol, x0)")
-    stacked = current_sizes().widths[1] < _NARROW if stacked is None else stacked
+    sizes = current_sizes()
+    stacked = sizes.widths[1] < _NARROW if stacked is None else stacked
     with style.context(STYLE):
         run = _run_of(certificate, runs)
         beside = run is not None or (certificate.initial_state is not None and _of_bounds(certificate))
         alone = not beside and not _bounded_for_all(certificate)
         rows = _STACKED[0], _STACKED[1] + _MORE * max(0, min(len(certificate.labels), _LINES) - 8)
-        width, high = (SINGLE_COLUMN[0], rows[0] if alone else sum(rows)) if stacked else (DOUBLE_COLUMN[0], _HIGH)
+        width = SINGLE_COLUMN[0] if stacked else sizes.of(DOUBLE_COLUMN)[0]
         head = _Head.of(certificate, width) if words else None
         above = 0.0 if head is None else head.high
+        high = (rows[0] if alone else sum(rows)) if stacked else _HIGH
+        if sizes.shape is not None and not stacked:
+            high = max(_LEAST_HIGH, width * sizes.shape - above)
         figure = Figure((width, high + above), layout="constrained")
         panels: Any = figure
         if head is not None:

@@ -55,6 +55,8 @@ FORMATS = {
     "nature": Sizes((89 / 25.4, 183 / 25.4), 7 / 8),
     "slide": Sizes((40 / 3, 40 / 3), 18 / 8, 9 / 16),
 }
+#: Of a page of HTML, whose text has 8 points and more on paper.
+PAGE = Sizes(FORMATS["ieee"].widths, 8 / 7)
 _SIZES = ContextVar("sizes", default=FORMATS["ieee"])
 
 
@@ -92,8 +94,15 @@ def figures_for(purpose: str = "ieee", *, width: float | None = None, state_unit
     if width is not None and not 0.5 <= width <= 100:
         raise ParameterError("width", f"= {width} is out of range; give 0.5 to 100 inches")
     sizes = FORMATS[purpose]._replace(state_unit=state_unit)
-    before = _SIZES.set(sizes if width is None else sizes._replace(widths=(width, width)))
+    with sized(sizes if width is None else sizes._replace(widths=(width, width))):
+        yield current_sizes()
+
+
+@contextmanager
+def sized(sizes: Sizes) -> Iterator[Sizes]:
+    """Draw and save figures of these sizes."""
+    before = _SIZES.set(sizes)
     try:
-        yield _SIZES.get()
+        yield sizes
     finally:
         _SIZES.reset(before)
