@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-from ptcc_certify.errors import HypothesisError, ParameterError
+from ptcc_certify.errors import Change, HypothesisError, ParameterError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.base import Protocol, refuse_no_protocol
@@ -69,11 +69,13 @@ def refuse_before_the_graph(case: Case) -> None:
     >>> from ptcc_certify.model.case import Case
     >>> refuse_before_the_graph(Case("fig1a", NominalProtocol(rho2=0)))
     Traceback (most recent call last):
-    ptcc_certify.errors.ParameterError: rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0
+    ptcc_certify.errors.ParameterError: rho2 = 0 gives no deadline; give rho2 > 0, and for what the constant gain ...
     """
     refuse_no_protocol(case.protocol)
     if not case.protocol.prescribed:
-        raise ParameterError("rho2", "= 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
+        constant = Change("gain_cap", case.protocol.rho1)
+        why = "= 0 gives no deadline; give rho2 > 0, and for what the constant gain leaves by T "
+        raise ParameterError("rho2", (why, constant))
     for name in ("sigma0", "disturbance"):
         if case.given(name) is not None and not case.sliding:
             raise ParameterError(name, "belongs to the sliding-mode protocol; leave it out or change the protocol")
