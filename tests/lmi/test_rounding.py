@@ -219,7 +219,7 @@ def test_page_and_statement_round_to_the_safe_side(k: int, tmp_path: Path):
     for c, rate in zip(map(Fraction, constants), map(Fraction, rates), strict=True):
         assert any(V.overshoot <= c and rate <= V.proved_rate for V in shown), (c, rate)
     if saved.effort.energy is not None:
-        above(re.findall(rf"\^2 dt \u2264 {NUMBER}", page)[:1], saved.effort.energy.value)
+        above(re.findall(rf"<sup>2</sup> dt \u2264 {NUMBER}", page)[:1], saved.effort.energy.value)
     if saved.effort.peak is not None:
         end = r", (?:\u2016u\u2016|the largest of agent)"  # the second where no limits are asked for
         above(re.findall(rf"\|u<sub>k</sub>\| \u2264 {NUMBER}{end}", page), saved.effort.peak.largest)
