@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bad_inputs import ptcc as command
+from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from PIL import Image
 
@@ -14,7 +15,9 @@ import ptcc_certify as ptcc
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.animation import animate
-from ptcc_certify.report.plots.glance import ENDS, colours_of, plot_glance
+from ptcc_certify.report.plots.camp_lines import _written
+from ptcc_certify.report.plots.final_colours import ENDS, colours_of
+from ptcc_certify.report.plots.glance import plot_glance
 from ptcc_certify.report.plots.graph import node_id
 
 CORPUS = Path(__file__).parents[1] / "corpus"
@@ -71,6 +74,59 @@ def test_final_states_stand_at_the_ends_of_lines_each_its_own() -> None:
         for name in names.split(", "):
             assert abs(float(final[name]) - value) <= 0.01, name
     assert sum(len(names.split(", ")) for names in ends) == 16
+
+
+def ends_told(ax: Axes) -> list[tuple[str, float]]:
+    """The names at the ends of lines, and the values beside them."""
+    texts = [text.get_text().replace("\n", " ") for text in ax.texts]
+    return [(text.rpartition(": ")[0], float(text.rpartition(": ")[2])) for text in texts if ": " in text]
+
+
+def test_noise_of_the_integrator_has_no_colour_and_no_labels_of_its_own() -> None:
+    ax = plot_glance(certificate("sampled")).axes[1]
+    assert ends_told(ax) == [("1, 2, 3, 4, 5, 6", 0)]
+    assert {line.get_color() for line in ax.lines if line.get_gid()} == set(colours_of(np.zeros(1)))
+
+
+def test_a_proved_end_that_is_not_reached_in_time_is_a_point_at_the_deadline() -> None:
+    ax = plot_glance(certificate("odd-labels")).axes[1]
+    points = [line.get_xydata()[0].tolist() for line in ax.lines if str(line.get_gid()).startswith("end")]
+    assert points == [[1, 0]] * 3 and ax.get_ylim()[0] < 0
+    assert not [line for line in plot_glance(certificate("fig3a")).axes[1].lines if "end" in str(line.get_gid())]
+
+
+def made(n: int, cut: int) -> ptcc.Certificate:
+    """A ring in two camps, of which the first has so many agents."""
+    ends = [(k, (k + step) % n) for k in range(n) for step in (1, 7)]
+    edges = [(f"a{j}", f"a{k}", -1 if (j < cut) != (k < cut) else 1) for j, k in ends]
+    protocol = ptcc.NominalProtocol(T=1, rho1=1, rho2=9, kappa=2)
+    return ptcc.certify(edges, protocol, [3 - k % 11 * 0.5 for k in range(n)], asks=ptcc.Asks(method="paper"))
+
+
+@pytest.mark.parametrize(("n", "lines"), [(45, 45), (64, 4)])
+def test_of_many_agents_labels_count_all_who_end_there(n: int, lines: int) -> None:
+    cert = made(n, 20)
+    ax = plot_glance(cert).axes[1]
+    assert sum(line.get_linewidth() < 2 and len(line.get_xdata()) > 2 for line in ax.lines) == lines
+    assert len(ax.collections) >= (n if lines == n else 2)
+    final = [float(x) for x in cert.proof.final_state.states]
+    for names, value in ends_told(ax):
+        shown, _, more = names.replace(" agents", "").rpartition("+")
+        counted = len(shown.strip(", ").split(", ")) + int(more) if shown else int(more)
+        assert counted == sum(abs(x - value) < 0.01 for x in final), names
+    assert len(ends_told(ax)) == 2
+
+
+def test_up_to_60_agents_are_coloured_by_where_they_end() -> None:
+    cert = made(45, 20)
+    lines = {line.get_gid(): line.get_color() for line in plot_glance(cert).axes[1].lines if line.get_gid()}
+    ends = colours_of(np.array([float(x) for x in cert.proof.final_state.states]))
+    assert [lines[node_id(k, "run")] for k in range(45)] == ends
+
+
+def test_names_fill_two_lines_before_they_are_counted() -> None:
+    assert _written([f"agent{k}" for k in range(6)], ": 0", 20) == "agent0, agent1,\nagent2, +3: 0"
+    assert _written(["lead", "ann", "bob"], ": 1", 12) == "lead, ann,\nbob: 1"
 
 
 def test_words_say_the_claim_and_the_bounds() -> None:

@@ -28,17 +28,19 @@ CAMP_STYLES: dict[str, tuple[str, Any]] = {
     "followers": (BEHIND, (0, (3, 1.5))),
     "agents": (BEHIND, "-"),
 }
-#: Agents of which each has a line; agents, and agents of one part of a graph, of which each has its name.
-LINE_AGENTS, NAMED_AGENTS, NAMED_OF_PART = 60, 8, 3
+#: Agents of which each has a line, and of one part of a graph of more; of which each has its name, and of one part.
+LINE_AGENTS, LINES_OF_PART, NAMED_AGENTS, NAMED_OF_PART = 60, 12, 8, 3
 #: Size in points of names, and columns of a name; points that the label of a tick takes.
 NAME_SIZE, NAME_LENGTH, TICK_ROOM = 7, 18, 24
 #: Columns below which no name is broken to stand at both ends; how much wider than others letters may be.
 SHORT, WIDER = 6, 1.1
 #: The least share of the width of a panel for the time up to ``T``; points beside it for the axis and its label, and
 #: between a line and its name.
-TIME_SHARE, AXIS_ROOM, NAME_GAP = 0.55, 40, 10
+TIME_SHARE, AXIS_ROOM, NAME_GAP = 0.5, 40, 10
 #: How far beyond ``T`` a figure goes, and how far if nothing changes by more than such a share there.
 LATEST, AFTER, CALM = 1.2, 1.1, 0.01
+#: How far a line may be from a value that is told of ``T``, as a share of the axis, and lead to it.
+ARRIVED = 0.02
 #: What keeps a name legible upon lines.
 HALO = [patheffects.withStroke(linewidth=2, foreground="white")]
 
@@ -117,9 +119,8 @@ def draw_agents(
 ) -> dict[int, str]:
     """Draw a quantity of every agent, (N, M), in the colours and lines of camps; return the colours of named lines.
 
-    Of up to eight agents each is named; of more, in a part of the graph with more than three, the agent whose quantity
-    is the largest at first, and that with the least. Of more than 60 agents such a part is drawn as its range and mean,
-    and has no lines but these two; of a ``size``, which is never negative, as what is below the largest.
+    Named are those of :func:`named_of_part`. Of more than 60 agents a part of more than twelve is drawn as its range
+    and mean, and has no lines but theirs; of a ``size``, which is never negative, as what is below the largest.
     """
     played = run.played if isinstance(run, Trajectory) else None
     group = camp_groups(structure) if played is None else family_groups(played.family)
@@ -128,11 +129,10 @@ def draw_agents(
     few, ranges = len(group) <= NAMED_AGENTS, False
     for name, (colour, line) in CAMP_STYLES.items():
         members, label = np.flatnonzero(group == name), name
-        ends = members
-        if not few and members.size > NAMED_OF_PART:
+        ends = named_of_part(members, values, size=size)
+        if len(ends) < members.size:
             rows = np.nan_to_num(values[members])
-            ends = members[sorted({int(rows[:, 0].argmax())} | (set() if size else {int(rows[:, 0].argmin())}))]
-            if len(group) > LINE_AGENTS:
+            if len(group) > LINE_AGENTS and members.size > LINES_OF_PART:
                 high, low = rows.max(axis=0), 0 if size else rows.min(axis=0)
                 ax.fill_between(run.t, low, high, color=colour, alpha=0.2, linewidth=0, step=step)
                 middle = high if size else rows.mean(axis=0)
@@ -147,6 +147,24 @@ def draw_agents(
     if ranges:
         ax.fill_between([], [], color=BEHIND, alpha=0.3, label="largest" if size else "mean and range")
     return named
+
+
+def named_of_part(members: np.ndarray, values: np.ndarray, *, size: bool = False) -> np.ndarray:
+    """Return the agents that are named among the members of a part of a graph, by a quantity of all agents, (N, M).
+
+    Of up to eight agents it is each; of more, in a part of more than three, the agent whose quantity is the largest at
+    first, and, unless it is a ``size``, that with the least.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.camp_lines import named_of_part
+    >>> named_of_part(np.arange(5), np.array([[3], [7], [1], [2], [4], *[[0]] * 5]))
+    array([1, 2])
+    """
+    if len(values) <= NAMED_AGENTS or members.size <= NAMED_OF_PART:
+        return members
+    first = np.nan_to_num(values[members, 0])
+    return members[sorted({int(first.argmax())} | (set() if size else {int(first.argmin())}))]
 
 
 def draw_deadlines(ax: Axes, run: Trajectory | AgentsTrajectory) -> None:
@@ -171,35 +189,50 @@ def name_agents(
 ) -> None:
     """Write the names of agents where their lines begin, and where they end if they end apart; show time ``until``.
 
-    If values are ``told``, (N,), they stand beside the names at the ends. Names take so much room only that the
-    time up to ``T`` keeps more than half of the width: longer ones have two lines, or stand at the beginning alone.
-    Where nothing changes after ``T``, little of that is shown unless told.
+    If values are ``told``, (N,), they stand beside the names at the ends, with those of all others who end there; a
+    point marks at ``T`` where a line has not arrived. Names take so much room only that the time up to ``T`` keeps half
+    of the width: longer ones have two lines, or stand at the beginning alone. Where nothing changes after ``T``, little
+    of that is shown unless told.
 
     ``lines`` holds the colours of the lines by agent, as :func:`draw_agents` returns them.
     """
     if not lines or not run.t.size:
         return
-    first, last = float(run.t[0]), _seen_until(run, values) if until is None else until
-    agents, colours = np.array(list(lines)), list(lines.values())
-    names = [shorten_text(printable(run.labels[v]), NAME_LENGTH) for v in agents]
-    at_end = values[agents, np.searchsorted(run.t, last * (1 + 1e-12), side="right") - 1]
-    digits = 2 - math.floor(math.log10(float(np.abs(np.nan_to_num(values)).max()) or 1.0))  # a run's 1e-9 is 0
-    tails = [""] * len(names) if told is None else [f": {round(float(told[v]), digits) + 0.0:.3g}" for v in agents]
+    first, last, T = float(run.t[0]), _seen_until(run, values) if until is None else until, _deadline(run)
+    agents, colours = list(lines), list(lines.values())
+    enders, enders_colours, tails, early = agents, colours, [""] * len(agents), np.zeros(len(values), dtype=bool)
+    at_end = values[:, np.searchsorted(run.t, last * (1 + 1e-12), side="right") - 1]
+    if told is not None:
+        digits = 2 - math.floor(math.log10(float(np.abs(np.nan_to_num(values)).max()) or 1.0))  # a run's 1e-9 is 0
+        tail_of = [f": {round(float(value), digits) + 0.0:.3g}" for value in told]
+        colour_of = {tail_of[v]: lines[v] for v in reversed(agents)}
+        enders = [*agents, *(v for v, tail in enumerate(tail_of) if v not in lines and tail in colour_of)]
+        tails = [tail_of[v] for v in enders]
+        enders_colours = [colour_of[tail] for tail in tails]
+        before = values[:, max(int(np.searchsorted(run.t, T)) - 1, 0)]
+        early = np.abs(before - told) > ARRIVED * abs(np.subtract(*ax.get_ylim()))
+        at_end = np.where(early, told, at_end)
+        for v in np.flatnonzero(early).tolist():
+            point: dict[str, Any] = {"marker": "o", "markersize": 3, "markevery": [0], "linewidth": 0.4, "zorder": 4}
+            ax.plot([T, last], [told[v]] * 2, color=lines.get(v, BEHIND), gid=f"end-{v}", **point)
+
+    def names_of(some: Sequence[int]) -> list[str]:
+        return [shorten_text(printable(run.labels[v]), NAME_LENGTH) for v in some]
 
     def columns_of(letters: Sequence[int]) -> list[list[tuple[float, float, str, str]]]:
-        texts = [_spread(ax, values[agents, 0], names, colours, letters[0])]
+        texts = [_spread(ax, values[agents, 0], names_of(agents), colours, letters[0])]
         if len(letters) > 1:
-            texts.append(_spread(ax, at_end, names, colours, letters[1], tails))
+            texts.append(_spread(ax, at_end[enders], names_of(enders), enders_colours, letters[1], tails))
         apart = len({height for height, *_ in texts[-1]}) > 1
         return texts if told is not None or apart else texts[:1]  # not where all end at the same place
 
-    wide, room, inside = _rooms(ax, (last - first) / ((min(last, _deadline(run)) - first) or 1))
+    wide, room, inside = _rooms(ax, (last - first) / ((min(last, T) - first) or 1))
     texts = columns_of([NAME_LENGTH + 8] * (1 + ends))
     needs = [max(text_width(name) for _, _, name, _ in column) for column in texts]
     if (free := (room - NAME_GAP * len(needs)) / WIDER) < sum(needs):
         right = [min(needs[1], max(free / 2, free - needs[0]))] if len(needs) > 1 else []
         letters = [max(3, int(part / text_width("x"))) for part in (free - sum(right), *right)]
-        longest = max(map(columns, names))
+        longest = max(map(columns, names_of(agents)))
         if len(letters) > 1 and told is None and min(letters) < max(longest / 2, min(longest, SHORT)):
             letters = [max(3, int((room - NAME_GAP) / WIDER / text_width("x")))]
         texts = columns_of(letters)
@@ -267,10 +300,11 @@ def _spread(
 ) -> list[tuple[float, float, str, str]]:
     """Return heights of lines, heights of their names, which do not overlap, names with their tails, and colours.
 
-    Lines that cannot be told apart there share one name, and one tail. Names have so many ``letters`` in a line.
+    Lines that cannot be told apart there share one name, of one colour; those with tails, all that have the same one.
+    Names have so many ``letters`` in a line.
     """
+    alike = tails if any(tails) else colours
     tails = tails or [""] * len(names)
-    alike = list(zip(colours, tails, strict=True))
     scale, limits = ax.yaxis.get_transform(), ax.get_ylim()
     low, high = scale.transform(np.array(limits))
     height = 0.75 * ax.get_window_extent().height / ax.figure.dpi * 72  # in points, when labels have their room
@@ -280,7 +314,7 @@ def _spread(
     for k in np.argsort(at, kind="stable"):
         if groups and at[k] - at[groups[-1][0]] < gap / 6:
             at[k] = at[groups[-1][0]]
-        same = [own for own in groups if at[k] == at[own[0]] and alike[k] == alike[own[0]]]
+        same = [own for own in groups if alike[k] == alike[own[0]] and (tails[k] or at[k] == at[own[0]])]
         if same:
             same[0].append(int(k))
         else:
@@ -297,12 +331,13 @@ def _spread(
 
 def _written(names: Sequence[str], tail: str, letters: int) -> str:
     """Join names with their tail, in a line or two of so many letters, and count those for which there is no room."""
+    wide = min(letters, NAME_LENGTH)
     for shown in range(len(names), 0, -1):
         text = ", ".join([*names[:shown], *([f"+{len(names) - shown}"] if shown < len(names) else [])])
         if columns(text) <= NAME_LENGTH and columns(text + tail) <= letters:
             return text + tail
-        head, rest = _halves(text, letters)
-        if columns(text) <= NAME_LENGTH and columns(rest + tail) <= letters:
+        head, rest = _halves(text, wide)
+        if columns(rest) <= wide and columns(rest + tail) <= letters:
             break
     else:
         if len(names) > 1:

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from matplotlib import style
 from matplotlib.axes import Axes
-from matplotlib.colors import LinearSegmentedColormap, Normalize, to_hex
 from matplotlib.figure import Figure, SubFigure
 
 from lmi.exact.decimal_rounding import near
@@ -20,14 +19,15 @@ from ptcc_certify.certificate.tube import tube_of
 from ptcc_certify.errors import ParameterError, SimulationError, spell
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, LABELLED_NODES, REPEATED_NODES
 from ptcc_certify.report.facts.of_certificate import facts_of
-from ptcc_certify.report.plots.camp_lines import draw_agents, name_agents
+from ptcc_certify.report.plots.camp_lines import LINE_AGENTS, camp_groups, draw_agents, name_agents, named_of_part
 from ptcc_certify.report.plots.decay import NothingDecays
 from ptcc_certify.report.plots.distributions import plot_final_states
+from ptcc_certify.report.plots.final_colours import at_deadline, colours_at_end, final_states, positions_of
 from ptcc_certify.report.plots.graph import node_id, plot_graph
 from ptcc_certify.report.plots.graph_labels import INSIDE
 from ptcc_certify.report.plots.motion import agents_run, plot_formation
 from ptcc_certify.report.plots.sizes import DOUBLE_COLUMN, SINGLE_COLUMN, current_sizes
-from ptcc_certify.report.plots.style import BOUND, STYLE, finished, legend_columns, new_axes, shown, time_label
+from ptcc_certify.report.plots.style import BEHIND, BOUND, STYLE, finished, legend_columns, new_axes, shown, time_label
 from ptcc_certify.report.plots.subject import read_back, trajectory_of
 from ptcc_certify.report.plots.tracking import plot_tracking
 from ptcc_certify.report.plots.trajectory import plot_trajectory
@@ -41,8 +41,6 @@ _HIGH, _RATIO = 3.0, 1.35
 _NARROW, _STACKED, _MORE = 5.0, (2.7, 2.5), 0.11
 #: Inches from line to line of the title, and of the words below it.
 _TITLE, _LINE = 0.17, 0.14
-#: Colours of final states, from the least over 0 to the largest: all are legible on white, and white on them.
-ENDS = LinearSegmentedColormap.from_list("ends", ["#A84300", "#6A6A6A", "#005A9C"])
 #: What is told above the panels: the claim as the title, and of each row of heads the first fact that there is.
 _TOLD = (("late", "tracking", "error"), ("input",), ("disturbed",))
 #: Colours of a verdict: whether everything asked was proved.
@@ -55,8 +53,8 @@ _LEAST = 1e-9
 _LAST = 1.04
 #: How dark tubes of all agents are together.
 _SHADE = 0.7
-#: Agents of which every one has a line; runs of more are drawn as ranges. Ends that are named.
-_LINES, _NAMED = LABELLED_NODES, 12
+#: Agents of which every one is named; of more those that begin highest and lowest. Up to how many lines are thick.
+_EACH, _THICK = LABELLED_NODES, 12
 
 
 def plot_glance(
@@ -75,9 +73,9 @@ def plot_glance(
     be, through a reaching phase of the sliding mode by bounds in floats (numerical), with its state at ``T`` at the end
     of its line: the proved final state, or under limits, with late messages or moving leaders that of the run.
 
-    Above 40 agents the graph is drawn as its matrix, and runs as ranges; above 1,000 no run is made for this. Of
-    families the runs are under many signals, of vehicles in the plane their ways are drawn. Where no initial state is
-    asked for it is what is left of the error from every one, or the graph alone.
+    Above 40 agents the graph is drawn as its matrix and few are named, above 60 runs are drawn as ranges; above 1,000
+    no run is made for this. Of families the runs are under many signals, of vehicles in the plane their ways are drawn.
+    Where no initial state is asked for it is what is left of the error from every one, or the graph alone.
 
     Parameters
     ----------
@@ -117,7 +115,7 @@ def plot_glance(
         run = _run_of(certificate, runs)
         beside = run is not None or (certificate.initial_state is not None and _of_bounds(certificate))
         alone = not beside and not _bounded_for_all(certificate)
-        rows = _STACKED[0], _STACKED[1] + _MORE * max(0, min(len(certificate.labels), _LINES) - 8)
+        rows = _STACKED[0], _STACKED[1] + _MORE * max(0, min(len(certificate.labels), _EACH) - 8)
         width, high = (SINGLE_COLUMN[0], rows[0] if alone else sum(rows)) if stacked else (DOUBLE_COLUMN[0], _HIGH)
         head = _Head.of(certificate, width) if words else None
         above = 0.0 if head is None else head.high
@@ -126,15 +124,15 @@ def plot_glance(
         if head is not None:
             _, panels = figure.subfigures(2, 1, height_ratios=(above, high))  # type: ignore[misc]
             head.write(figure)
-        ends = _ends(certificate, run)
+        ends, colours = final_states(certificate, run), colours_at_end(certificate, run)
         if alone:
-            _draw_graph(panels.subfigures(1, 1), certificate, ends)
+            _draw_graph(panels.subfigures(1, 1), certificate, ends, colours)
             return shown(figure)
         if stacked:
             left, right = panels.subfigures(2, 1, height_ratios=rows)
         else:
             left, right = panels.subfigures(1, 2, width_ratios=(1, _RATIO))
-        _draw_graph(left, certificate, ends)
+        _draw_graph(left, certificate, ends, colours)
         if beside:
             _draw_runs(right, certificate, run, ends, runs, time_unit)
         else:
@@ -163,54 +161,9 @@ def _run_of(certificate: Certificate, runs: Sequence[Any] | None) -> Any:
         raise ParameterError("a state is beyond the range of float64; nothing is drawn of it") from None
 
 
-def _ends(certificate: Certificate, run: Any) -> np.ndarray:
-    """Return the state of every agent at ``T``, (N,): of an interval its middle, NaN where none is known.
-
-    It is the proved final state, or under a gain cap, with late messages or moving leaders that of the run.
-    """
-    proof, part = certificate.proof, certificate.proof.agents
-    if part is None and run is None and (proof.leaders_move or proof.late is not None):
-        return np.full(len(certificate.labels), np.nan)
-    if part is None and run is not None and (proof.limits or proof.late is not None or proof.leaders_move):
-        return at_deadline(run, run.positions)
-    known: list[Any] = []
-    if part is not None:  # of agents of order n that of positions; in several dimensions there is no one number
-        if run is not None and part.dimension == 1 and part.protocol.gain_cap is not None:
-            return at_deadline(run, run.states[:, 0, 0])
-        known = [agent[0][0][0] for agent in part.final_state or ()] if part.dimension == 1 else []
-    elif certificate.of_family:
-        ends_of_family = certificate.family_proof.final_positions
-        known = [None if end is None else sum(end) / 2 for end in ends_of_family or ()]
-    elif certificate.graph_proof.final_positions is not None:
-        known = list(certificate.graph_proof.final_positions.states)
-    try:
-        ends = [np.nan if end is None else float(end) for end in known]
-    except OverflowError:
-        raise ParameterError("a final state is beyond the range of float64; nothing is drawn of it") from None
-    return np.array(ends or [np.nan] * len(certificate.labels))
-
-
 def _of_bounds(certificate: Certificate) -> bool:
     """Tell whether runs under many signals are drawn, or bounds alone."""
     return certificate.of_family or certificate.proof.late is not None
-
-
-def at_deadline(run: Any, values: np.ndarray) -> np.ndarray:
-    """Return what values of a run, (N, M), are at ``T``, (N,)."""
-    return np.array([np.interp(float(run.protocol.gain.T), run.t, own) for own in values])
-
-
-def colours_of(ends: np.ndarray, largest: float | None = None) -> list[str]:
-    """Return the colours of states up to a largest one, by default theirs; grey of those that are not known.
-
-    Examples
-    --------
-    >>> from ptcc_certify.report.plots.glance import colours_of
-    >>> colours_of(np.array([2.0, 0.0, -2.0]))
-    ['#005a9c', '#6a6a6a', '#a84300']
-    """
-    largest = largest or float(np.nanmax(np.abs(ends), initial=0)) or 1.0
-    return [to_hex(colour) for colour in ENDS(Normalize(-largest, largest)(np.nan_to_num(ends)))]
 
 
 class _Head(NamedTuple):
@@ -276,13 +229,13 @@ def _set(text: str) -> str:
     return text.replace("<=", "\N{LESS-THAN OR EQUAL TO}").replace("||", "\N{DOUBLE VERTICAL LINE}")
 
 
-def _draw_graph(panel: SubFigure, certificate: Certificate, ends: np.ndarray) -> None:
+def _draw_graph(panel: SubFigure, certificate: Certificate, ends: np.ndarray, colours: list[str] | None) -> None:
     """Draw who listens to whom, in the colours of final states; of a graph too large for that its final states."""
     subject = certificate.family_proof.family if certificate.of_family else certificate.graph_proof.structure
     if ends.size <= LABELLED_NODES:
         beside = max(map(columns, certificate.labels)) > INSIDE  # labels reach beyond the nodes
         ax = panel.add_axes((0.11, 0.16, 0.78, 0.82) if beside else (0.02, 0.16, 0.96, 0.82))
-        plot_graph(subject, ax=ax, colours=None if certificate.of_family or np.isnan(ends).all() else colours_of(ends))
+        plot_graph(subject, ax=ax, colours=colours)
         if (legend := ax.get_legend()) is not None:
             texts = [text.get_text() for text in legend.get_texts()]
             handles: Any = legend.legend_handles
@@ -338,11 +291,12 @@ def _draw_error(ax: Axes, certificate: Certificate, time_unit: str) -> None:
 
 def _draw_run(ax: Axes, certificate: Certificate, run: Any, ends: np.ndarray, time_unit: str) -> None:
     """Draw the run of every agent of one graph within its tube, with its state at ``T`` at the end of its line."""
-    values = run.positions if isinstance(run, Trajectory) else run.states[:, 0, 0]
-    T, colours = float(run.protocol.gain.T), colours_of(ends)
+    values, T = positions_of(run), float(run.protocol.gain.T)
+    colours = colours_at_end(certificate, run) or [BEHIND] * len(values)
     ends = np.where(np.isnan(ends), at_deadline(run, values), ends)
-    if len(values) > _LINES:
-        named = draw_agents(ax, run, values, certificate.graph_proof.structure)
+    structure = certificate.graph_proof.structure
+    if len(values) > LINE_AGENTS:
+        named = draw_agents(ax, run, values, structure)
     else:
         single = isinstance(run, Trajectory)
         tube = tube_of(certificate.graph_proof, run.t, run.targets) if single else None
@@ -351,15 +305,19 @@ def _draw_run(ax: Axes, certificate: Certificate, run: Any, ends: np.ndarray, ti
         ideal = single and not (proof.limits or proof.late is not None or proof.leaders_move)
         until = run.t < T if ideal and not run.deadline_resolved else run.t >= 0
         for k, colour in enumerate(colours):
-            width = 1.3 if len(values) <= _NAMED else 0.8
+            width = 1.3 if len(values) <= _THICK else 0.8
             ax.plot(run.t[until], values[k][until], color=colour, linewidth=width, gid=node_id(k, "run"))
             if tube is not None and np.isfinite(tube.low[k]).any():
                 shade: dict[str, Any] = {"alpha": _SHADE / max(5, len(values)), "linewidth": 0}
                 ax.fill_between(run.t[until], tube.low[k][until], tube.high[k][until], color=colour, **shade)
         named = dict(enumerate(colours))
+        if len(values) > _EACH:
+            group = camp_groups(structure)
+            parts = [named_of_part(np.flatnonzero(group == part), values) for part in dict.fromkeys(group)]
+            named = {int(v): colours[v] for v in np.concatenate(parts)}
         if tube is not None and not certificate.direct:
             ax.set_title("shaded: bounds integrated in floats (numerical)", loc="left")
-    seen = values[:, run.t <= _LAST * T]
+    seen = np.column_stack([values[:, run.t <= _LAST * T], ends])
     least, most = float(seen.min()), float(seen.max())
     room = 0.06 * (most - least) or 1.0
     ax.set_ylim(least - room, most + room)
