@@ -220,9 +220,40 @@ def test_what_was_asked_is_told_beside_a_claim_that_is_proved(name: str) -> None
     assert "certified" not in texts and told[9:30] == read.facts()[-1].text[:21]
 
 
-def test_numerical_bounds_are_named() -> None:
-    titles = [plot_glance(certificate(name)).axes[1].get_title(loc="left") for name in ("sliding", "sliding-rest")]
-    assert titles == ["shaded: bounds integrated in floats (numerical)", ""]
+def test_what_shades_and_colours_tell_is_named() -> None:
+    titles = [plot_glance(certificate(name)).axes[1].get_title(loc="left") for name in ("sliding", "fig3a", "gain-cap")]
+    colour = "colour: state at $T$"
+    assert titles == [f"shaded: bounds in floats (numerical); {colour}", f"shaded: proved; {colour}", colour]
+    legend = plot_glance(certificate("fig1b")).axes[0].figure.legends[0]
+    assert "leads" in [text.get_text() for text in legend.get_texts()]
+    assert "$T_r$ = 0.5" in [text.get_text() for text in plot_glance(certificate("sliding")).axes[1].texts]
+
+
+@pytest.mark.parametrize(
+    ("name", "title", "note"),
+    [
+        (
+            "late",
+            "Late messages: every agent within 0.000361 of",
+            "nothing late: interval bipartite consensus at T = 1",
+        ),
+        ("moving", "Moving leaders, disturbances: every follower on its", "leaders at rest, without disturbances: int"),
+        (
+            "late-own",
+            "Late messages under a gain cap: every agent within 0.136",
+            "without limits, nothing late: bipart",
+        ),
+        ("sampled", "Gain \u2264 20, zero-order hold 0.001", "without limits: stability at T = 1 (Theorem 1.2)"),
+        ("sampled-slowly", "Under limits of the gain: nothing is proved", "without limits: stability at T = 1"),
+        ("parts", "a, b, c: bipartite consensus at T = 1", "error: "),
+    ],
+)
+def test_titles_say_what_was_asked_and_never_deny_what_is_drawn(name: str, title: str, note: str) -> None:
+    texts = [text.get_text() for text in plot_glance(certificate(name)).texts]
+    assert " ".join(texts).startswith(title)
+    assert any(text.startswith(note) for text in texts)
+    for text in texts:
+        assert not text.endswith((" =", " \u2264", "Theorem", " 0.99")) and not text.startswith(("%", "=", "\u2264"))
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Sequence
 from contextlib import suppress
@@ -18,6 +19,7 @@ from ptcc_certify.certificate.fact import Fact
 from ptcc_certify.certificate.tube import tube_of
 from ptcc_certify.errors import ParameterError, SimulationError, spell
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, LABELLED_NODES, REPEATED_NODES
+from ptcc_certify.report.facts.claim import assumptions
 from ptcc_certify.report.facts.of_certificate import facts_of
 from ptcc_certify.report.plots.camp_lines import LINE_AGENTS, camp_groups, draw_agents, name_agents, named_of_part
 from ptcc_certify.report.plots.decay import NothingDecays
@@ -31,7 +33,7 @@ from ptcc_certify.report.plots.style import BEHIND, BOUND, STYLE, finished, lege
 from ptcc_certify.report.plots.subject import read_back, trajectory_of
 from ptcc_certify.report.plots.tracking import plot_tracking
 from ptcc_certify.report.plots.trajectory import plot_trajectory
-from ptcc_certify.report.text_layout import columns
+from ptcc_certify.report.text_layout import NO_BREAK, columns
 from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.family_behaviour import DEPENDS
 
@@ -42,7 +44,7 @@ _NARROW, _STACKED, _MORE = 5.0, (2.7, 2.5), 0.11
 #: Inches from line to line of the title, and of the words below it.
 _TITLE, _LINE = 0.17, 0.14
 #: What is told above the panels: the claim as the title, and of each row of heads the first fact that there is.
-_TOLD = (("late", "tracking", "error"), ("input",), ("disturbed",))
+_TOLD = (("late", "tracking", "limited", "error"), ("input",), ("disturbed",))
 #: Colours of a verdict: whether everything asked was proved.
 _GOOD, _DOUBT = "#117733", "#8A5A00"
 #: Characters of an inch of text; of the title, which is larger.
@@ -182,8 +184,9 @@ class _Head(NamedTuple):
         (verdict,) = [spell(fact.note) for fact in facts if fact.head == "verdict"]
         fine = verdict.partition(";")[0] == "certified" and certificate.assessment.useful is not False
         notes = [] if fine else [f"verdict: {verdict}"]
+        asked, told = _asked(certificate, facts)
         for heads in _TOLD:
-            group = next(filter(None, ([f for f in facts if f.head == head] for head in heads)), [])
+            group = next(filter(None, ([f for f in facts if f.head == head and f is not told] for head in heads)), [])
             first = sorted(group, key=lambda fact: fact.side == "down")[:2]  # what is proved above
             notes += [f"{fact.head}: {spell(fact.note)}" for fact in first]
         word = certificate.assessment.word
@@ -191,9 +194,16 @@ class _Head(NamedTuple):
             word = f"asked: {word}"  # the claim itself is proved
         beside = width > _NARROW  # the verdict stands beside the title, or below it
         room = int(_OF_TITLE * (width - (0.3 + len(word) / _OF_TITLE if beside else 0)))
-        claims = [_fitting(fact, room) for fact in facts if fact.head == "claim"]
-        title = textwrap.wrap(_set("; ".join(claims)), room, max_lines=4, placeholder=" ...")
-        lines = [line for note in notes for line in textwrap.wrap(_set(note), int(_CHARACTERS * width))]
+        claimed = [fact for fact in facts if fact.head == "claim"]
+        claims = [_fitting(fact, room) for fact in claimed]
+        if asked:  # the claim is of less than what was asked, and what is drawn
+            ideal = assumptions(certificate)
+            texts = [text.replace("".join(f", {one}" for one in ideal), "") for text in claims]
+            notes.insert(not fine, f"{', '.join(ideal)}: {'; '.join(t for t in texts if t != ', '.join(ideal))}")
+        title = _wrapped(asked or "; ".join(claims), room, max_lines=4, placeholder=" ...")
+        if asked or len(claimed) == 1:  # else labels stand first
+            title[0] = title[0][:1].upper() + title[0][1:]
+        lines = [line for note in notes for line in _wrapped(note, int(_CHARACTERS * width))]
         return cls(title, lines, word, fine and not claims[0].startswith(DEPENDS), beside)
 
     @property
@@ -207,7 +217,6 @@ class _Head(NamedTuple):
         top = high - 0.06
         plain: dict[str, Any] = {"va": "top", "parse_math": False}
         for number, text in enumerate(self.title):
-            text = text[:1].upper() + text[1:] if not number else text
             figure.text(0.012, (top - number * _TITLE) / high, text, fontsize=10, weight="bold", **plain)
         begin = top - _TITLE * len(self.title)
         x, y = (0.988, top) if self.beside else (0.012, begin)
@@ -224,9 +233,59 @@ def _fitting(fact: Fact, characters: int) -> str:
     return next((text for text in texts if len(text) <= characters), texts[-1])
 
 
-def _set(text: str) -> str:
-    """Return a text with the signs of print."""
-    return text.replace("<=", "\N{LESS-THAN OR EQUAL TO}").replace("||", "\N{DOUBLE VERTICAL LINE}")
+def _asked(certificate: Certificate, facts: Sequence[Fact]) -> tuple[str, Fact | None]:
+    """Say what is proved of late messages, moving leaders and limits of the gain, and by which fact; of others nothing.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.glance import _asked
+    >>> asks = {"messages": LateMessages(delay="0.01", gain_cap=20), "asks": Asks(simulation=False)}
+    >>> cert = certify([("a", "b", 1)], NominalProtocol(T=1, rho1=1, rho2=2, kappa=1), [1, 2], **asks)
+    >>> _asked(cert, cert.facts())[0]
+    'late messages under a gain cap: every agent within 0.000552 of its final state at T'
+    """
+    late, leaders = certificate.proof.late, certificate.proof.asked_leaders
+    if late is None and leaders is None:
+        if not certificate.limits or certificate.proof.agents is not None:
+            return "", None
+        proved = [f for f in facts if f.head == "error" and not spell(f.note).startswith("without")]
+        if not proved:
+            return "under limits of the gain: nothing is proved", None
+        return spell(proved[0].brief[0] if proved[0].brief else proved[0].note), proved[0]
+    messages = None if late is None else late.messages
+    parts = {
+        "moving leaders": leaders is not None and leaders.speed > 0,
+        "disturbances": leaders is not None and leaders.disturbance > 0,
+    }
+    given = [name for name, there in parts.items() if there]
+    if messages is not None and not messages.exact:
+        given.insert(0, messages.name)
+    if messages is not None and messages.vehicles is not None:
+        given = [" of ".join([*given[:1], "vehicles"]), *given[1:]]
+    capped = certificate.limits or (messages is not None and messages.gain_cap is not None)
+    under = " ".join(filter(None, (", ".join(given), "under a gain cap" if capped else "")))
+    every = [f for f in facts if f.head in ("late", "tracking", "limited") and "every " in spell(f.note)]
+    if not every:
+        return f"{under}: nothing is proved", None
+    text = spell(every[0].note)
+    return f"{under}: {text[text.index('every ') :].partition(';')[0]}", every[0]
+
+
+#: Blanks at which no line breaks: before a sign of percent, about equality, around numbers of theorems or T.
+_TIED = re.compile(r" (?=%)| (?=[=\u2264] )|(?<=[=\u2264]) |(?<=Theorem) |(?<=Corollary) |(?<=\d) (?=T\b)")
+
+
+def _wrapped(text: str, characters: int, **limits: Any) -> list[str]:
+    """Return the lines of a text with the signs of print, in which no number is parted from what it is of.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.glance import _wrapped
+    >>> _wrapped("consensus at T = 1 (Theorem 2.1): 5 % is left", 16)
+    ['consensus at', 'T = 1', '(Theorem 2.1):', '5 % is left']
+    """
+    text = text.replace("<=", "\N{LESS-THAN OR EQUAL TO}").replace("||", "\N{DOUBLE VERTICAL LINE}")
+    return [line.replace(NO_BREAK, " ") for line in textwrap.wrap(_TIED.sub(NO_BREAK, text), characters, **limits)]
 
 
 def _draw_graph(panel: SubFigure, certificate: Certificate, ends: np.ndarray, colours: list[str] | None) -> None:
@@ -315,8 +374,10 @@ def _draw_run(ax: Axes, certificate: Certificate, run: Any, ends: np.ndarray, ti
             group = camp_groups(structure)
             parts = [named_of_part(np.flatnonzero(group == part), values) for part in dict.fromkeys(group)]
             named = {int(v): colours[v] for v in np.concatenate(parts)}
-        if tube is not None and not certificate.direct:
-            ax.set_title("shaded: bounds integrated in floats (numerical)", loc="left")
+        keys = ["colour: state at $T$"]
+        if tube is not None and np.isfinite(tube.low[:, run.t < T]).any():
+            keys.insert(0, "shaded: proved" if certificate.direct else "shaded: bounds in floats (numerical)")
+        ax.set_title("; ".join(keys), loc="left", fontsize=7)
     seen = np.column_stack([values[:, run.t <= _LAST * T], ends])
     least, most = float(seen.min()), float(seen.max())
     room = 0.06 * (most - least) or 1.0
@@ -325,6 +386,10 @@ def _draw_run(ax: Axes, certificate: Certificate, run: Any, ends: np.ndarray, ti
     name_agents(ax, run, values, named, ends=True, until=_LAST * T, told=ends)
     deadline: dict[str, Any] = {"textcoords": "offset points", "ha": "right", "va": "top", "fontsize": 7}
     ax.annotate(f"$T$ = {near(run.protocol.gain.T)}", (T, most + room), (-3, -2), **deadline)
+    if isinstance(run, Trajectory) and run.sliding is not None and run.sliding.sigma0.any():
+        reached = float(run.sliding.protocol.T_r)
+        ax.axvline(reached, color="black", linewidth=0.8, linestyle=(0, (5, 2, 1, 2)))
+        ax.annotate(f"$T_r$ = {near(run.sliding.protocol.T_r)}", (reached, most + room), (-3, -2), **deadline)
     part = certificate.proof.agents
     name = "state $x_k$" if part is None and certificate.proof.velocities is None else "position"
     finished(ax, time_label("time $t$", time_unit), f"{name}, coordinate 1" if part and part.dimension > 1 else name)

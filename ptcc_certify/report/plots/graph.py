@@ -290,7 +290,7 @@ def _draw_coloured(
         marker, size = _SHAPES.get(groups[k], ("o", 1.0))
         edge = outline if k in leads else {"markeredgewidth": 0}
         ax.plot(*p, marker, markersize=2 * radius * size, color=colour, zorder=3, gid=node_id(k), **edge)
-    if 0 < len(leads) < len(groups):
+    if leads:
         ax.plot([], [], "o", color="white", markersize=6, label="leads", **outline)
     for name, (marker, _) in _SHAPES.items():
         if (groups == name).any():
