@@ -68,7 +68,7 @@ from ptcc_certify.report.plots.input import plot_effort, plot_input
 from ptcc_certify.report.plots.motion import plot_formation, plot_motion
 from ptcc_certify.report.plots.sizes import DOUBLE_COLUMN, SINGLE_COLUMN, figures_for
 from ptcc_certify.report.plots.spectrum import CLASS_MARKERS, plot_frontier, plot_spectrum
-from ptcc_certify.report.plots.style import EDGE_STYLES, STYLE, save_figure
+from ptcc_certify.report.plots.style import BEHIND, BOUND, EDGE_STYLES, STYLE, save_figure
 from ptcc_certify.report.plots.tracking import plot_tracking
 from ptcc_certify.report.plots.trade_off import plot_trade_off
 from ptcc_certify.report.plots.trajectory import plot_run, plot_sliding, plot_trajectory
@@ -82,6 +82,7 @@ pytestmark = [
     pytest.mark.usefixtures("quick_search"),
 ]
 
+CORPUS = Path(__file__).parents[1] / "corpus"
 STYLE_FILE = Path(ptcc_certify.__file__).with_name("ptcc.mplstyle")
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 NAMES = ("fig1a", "fig3b", "fig5b", "apart", "single")
@@ -336,6 +337,19 @@ def test_with_late_messages_their_bound_of_the_input_is_drawn_and_not_that_of_me
     assert not any("certified peak" in text for text in texts)
     punctual = [text.get_text() for text in drawn(plot_input(cert.trajectory, certificate=cert)).texts]
     assert any("certified peak" in text and "messages at once" in text for text in punctual)
+
+
+@pytest.mark.parametrize(
+    ("name", "bounds", "scale"),
+    [("group-vehicles", [290.4], "symlog"), ("late-capped", [36.75], "linear"), ("fig5a", [380], "linear")],
+)
+def test_bounds_of_the_run_that_is_drawn_are_lines_in_sight(name: str, bounds: list[float], scale: str) -> None:
+    ax = drawn(plot_input(CORPUS / f"{name}.json"))
+    told = [text for text in ax.texts if "peak" in text.get_text() or "at most" in text.get_text()]
+    assert [text.xy[1] for text in told] == pytest.approx(bounds, rel=1e-3)  # type: ignore[attr-defined]
+    dashed = [line.get_ydata()[0] for line in ax.lines if line.get_linestyle() == "--" and len(line.get_ydata()) == 2]
+    assert dashed == pytest.approx([sign * bound for bound in bounds for sign in (1, -1)], rel=1e-3)
+    assert ax.get_yscale() == scale and ax.get_ylim()[1] > max(bounds)
 
 
 def test_a_held_input_is_drawn_in_steps_where_every_period_is_sampled() -> None:
@@ -658,10 +672,11 @@ def test_the_run_that_is_drawn_is_the_one_that_was_asked(title: str) -> None:
     run = simulate(graph, protocol, x0, actuator=next(iter(ASKED[title].get("limits", ())), None), **acts)
     ends = [line.get_ydata()[-1] for line in agent_lines(states)]  # type: ignore[index]
     assert sorted(ends) == pytest.approx(sorted(run.states[:, -1]), abs=1e-6)
-    bounds = [line.get_label() for line in drawn_axes[1].lines if "bound" in str(line.get_label())]
-    assert all(
-        str(label).endswith(("nothing late", "nothing inexact", "leaders at rest", "no limits")) for label in bounds
-    )
+    decay = drawn(drawn_axes[1])
+    (bound,) = [line for line in decay.lines if line.get_label() == "proved without these"]
+    assert same_color(bound.get_color(), BEHIND) and bound.get_linewidth() < 1
+    assert not any(same_color(line.get_color(), BOUND) for line in decay.lines)  # none that the run may cross
+    assert decay.get_window_extent().height >= 0.55 * decay.figure.bbox.height
 
 
 def test_where_delays_are_too_short_for_a_run_the_states_say_that_they_are_without() -> None:
