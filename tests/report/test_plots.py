@@ -1047,7 +1047,7 @@ def test_every_figure_names_the_unit_of_time() -> None:
         assert plot(cert, time_unit="ms").get_xlabel() == "time $t$ (ms)"
         assert plot(cert).get_xlabel() == "time $t$"
     assert plot_decay(cert, axis="time", time_unit="ms").get_xlabel() == "time $t$ (ms)"
-    assert {ax.get_xlabel() for ax in plot_run(cert, time_unit="s").axes} == {"time $t$ (s)"}
+    assert [ax.get_xlabel() for ax in plot_run(cert, time_unit="s").axes] == ["", "time $t$ (s)"]
 
 
 def test_every_figure_has_one_signature() -> None:
@@ -1235,7 +1235,7 @@ def test_names_of_agents_that_end_at_one_place_do_not_cover_each_other():
 
 
 @pytest.mark.few(0)
-def test_coordinates_of_agents_stand_below_each_other_and_side_by_side_in_a_wide_figure():
+def test_coordinates_in_the_plane_stand_side_by_side():
     pair = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
     cert = ptcc_certify.certify(
@@ -1245,10 +1245,11 @@ def test_coordinates_of_agents_stand_below_each_other_and_side_by_side_in_a_wide
         agents=ptcc_certify.Agents(order=2),
         asks=ptcc_certify.Asks(method="paper", simulation=False),
     )
-    for wide, shape in ((False, (4, 1)), (True, (2, 2))):
+    for wide in (False, True):
         axes = ptcc_certify.plot_motion(cert, wide=wide).axes
-        assert axes[0].get_subplotspec().get_gridspec().get_geometry() == shape
-        assert {ax.get_ylabel() for ax in axes} == {"position 1", "position 2", "velocity 1", "velocity 2"}
+        assert axes[0].get_subplotspec().get_gridspec().get_geometry() == (2, 2)
+        assert [ax.get_ylabel() for ax in axes] == ["position x", "position y", "velocity x", "velocity y"]
+        assert [ax.get_xlabel() for ax in axes] == ["", "", "time $t$", "time $t$"]
         assert len({(ax.get_xlim(), tuple(ax.get_xticks())) for ax in axes}) == 1
         for ax in axes:  # velocities begin at 0, and are named where they are largest
             assert sorted(text.get_text() for text in ax.texts) == ["a", "b"]
@@ -1264,6 +1265,12 @@ def test_a_motion_names_its_agents_and_all_panels_have_the_same_times():
     assert [sorted(text.get_text() for text in ax.texts) for ax in panels[:2]] == [["ann", "bob"], ["ann, bob"]]
     assert len(panels) == 4 and {ax.get_xlim() for ax in panels} == {panels[1].get_xlim()}
     assert "deadline $T$" in {text.get_text() for text in panels[0].get_legend().get_texts()}
+
+
+def test_states_and_sliding_variables_have_the_same_times() -> None:
+    upper, lower = plot_run(certified("sliding")).axes
+    assert upper.get_xlim() == lower.get_xlim() and list(upper.get_xticks()) == list(lower.get_xticks())
+    assert (upper.get_xlabel(), lower.get_xlabel()) == ("", "time $t$")
 
 
 @pytest.mark.few(0)

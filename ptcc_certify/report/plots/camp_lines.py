@@ -259,6 +259,19 @@ def name_agents(
     ax.spines["bottom"].set_bounds(first, last)  # names have their room before time begins
 
 
+def share_times(named: Sequence[Axes], every: Sequence[Axes], rows: int) -> None:
+    """Give all panels, in so many rows, the same times, with room for names at the left; the last row tells them."""
+    longest = max(named, key=lambda ax: ax.get_xlim()[1])
+    last, ticks = longest.get_xlim()[1], longest.get_xticks()
+    names = max(-ax.get_xlim()[0] / np.ptp(ax.get_xlim()) for ax in named)
+    for ax in every:
+        ax.set_xticks(ticks)
+        ax.set_xlim(-last * names / (1 - names), last)
+        ax.spines["bottom"].set_bounds(0, last)
+        spec = ax.get_subplotspec()
+        ax.tick_params(labelbottom=spec is None or spec.rowspan.stop == rows)
+
+
 def _deadline(run: Trajectory | AgentsTrajectory) -> float:
     """Return the time at which agents are where they should be; the last instant where there is no such time."""
     prescribed = isinstance(run, AgentsTrajectory) or run.protocol.prescribed

@@ -22,6 +22,7 @@ from ptcc_certify.report.plots.camp_lines import (
     family_camps,
     family_groups,
     name_agents,
+    share_times,
 )
 from ptcc_certify.report.plots.runs_under_signals import bound_label, count_of_signals, is_worst, runs_of
 from ptcc_certify.report.plots.sizes import DOUBLE_COLUMN, SINGLE_COLUMN, current_sizes
@@ -171,7 +172,7 @@ def _draw_tubes(
 def plot_run(
     subject: Any, *, reaching: Sequence[ReachingTime] | None = None, wide: bool = False, time_unit: str = ""
 ) -> Figure:
-    """Draw the states ``x_k(t)``; in a reaching phase the sliding variables ``sigma_k(t)`` below them.
+    """Draw the states ``x_k(t)``; in a reaching phase the sliding variables ``sigma_k(t)`` below, at the same times.
 
     Parameters
     ----------
@@ -207,6 +208,8 @@ def plot_run(
     plot_trajectory(run, ax=upper, time_unit=time_unit)
     reaching = subject.proof.reaching if reaching is None and isinstance(subject, Certificate) else reaching
     plot_sliding(run, ax=lower, reaching=reaching, time_unit=time_unit)
+    upper.set_xlabel("")
+    share_times([upper, lower], [upper, lower], 2)
     return share_legend(figure, 3 if wide else 2)
 
 
