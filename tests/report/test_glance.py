@@ -17,7 +17,7 @@ from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.animation import animate
 from ptcc_certify.report.plots.camp_lines import _written
 from ptcc_certify.report.plots.final_colours import ENDS, colours_of
-from ptcc_certify.report.plots.glance import plot_glance
+from ptcc_certify.report.plots.glance import joined_above, plot_glance
 from ptcc_certify.report.plots.graph import node_id
 
 CORPUS = Path(__file__).parents[1] / "corpus"
@@ -44,7 +44,7 @@ def certificate(name: str) -> ptcc.Certificate:
 def test_every_run_is_drawn_inside_its_tube(name: str) -> None:
     figure = plot_glance(certificate(name))
     ax = figure.axes[1]
-    lines = {line.get_gid(): line for line in ax.lines if line.get_gid()}
+    lines = {line.get_gid(): line for line in ax.lines if str(line.get_gid()).startswith("run")}
     assert len(lines) == len(certificate(name).labels) == len(ax.collections)
     room = 1e-6 * np.ptp(ax.get_ylim())
     for k, tube in enumerate(ax.collections):
@@ -55,6 +55,22 @@ def test_every_run_is_drawn_inside_its_tube(name: str) -> None:
         low, high = (np.interp(t, rim[:, 0], rim[:, 1]) for rim in rims)
         least, most = np.minimum(low, high), np.maximum(low, high)
         assert (least - room <= x).all() and (x <= most + room).all(), k
+
+
+@pytest.mark.parametrize("name", ["late-missed", "late-capped", "vehicles-formation"])
+def test_steps_of_a_bound_are_joined_and_none_of_it_is_cut_off(name: str) -> None:
+    cert = certificate(name)
+    T, t = float(cert.protocol.T), cert.asked_trajectory.t
+    tube, fine = cert.tube(t), np.linspace(0, T, 20011)
+    sharp = cert.tube(fine)
+    for k in range(len(cert.labels)):
+        half = (tube.high[k] - tube.low[k]) / 2
+        joined = joined_above(t, half, 0.1 * T)
+        known = np.isfinite(half)
+        assert (joined[known] >= half[known] * (1 - 1e-12)).all()
+        assert (np.interp(fine, t, joined) >= (sharp.high[k] - sharp.low[k]) / 2 * (1 - 1e-9) - 1e-12).all()
+        before = t < 0.9 * T
+        assert np.sum(np.diff(joined[before]) == 0) <= np.sum(np.diff(half[before]) == 0)
 
 
 def test_colours_tell_the_sign_of_a_state_and_are_legible_on_white_and_under_white() -> None:

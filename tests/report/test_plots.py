@@ -489,6 +489,24 @@ def test_a_weight_stands_where_no_other_arrow_crosses() -> None:
         assert not box.count_contains(others), weight
 
 
+def test_no_weight_hides_an_arrowhead() -> None:
+    for name in ("switching", "dwell", "late-camps"):
+        figure = plot_glance(CORPUS / f"{name}.json")
+        FigureCanvasAgg(figure).draw()
+        first = figure.axes[0]
+        for ax in first.child_axes or [first]:
+            weights = [patch.get_window_extent() for t in ax.texts if (patch := t.get_bbox_patch()) is not None]
+            for arrow in arrows_in(ax):
+                paths, _ = arrow._get_path_in_displaycoord()  # type: ignore[attr-defined]
+                heads = [
+                    Bbox([corners.min(axis=0), corners.max(axis=0)]) for corners in (p.vertices[:3] for p in paths[1:])
+                ]
+                for head in heads:
+                    shared = [Bbox.intersection(box, head) for box in weights]
+                    covered = max((one.width * one.height for one in shared if one is not None), default=0)
+                    assert covered <= 0.25 * head.width * head.height, (name, covered)
+
+
 def test_a_flat_graph_has_a_flat_figure() -> None:
     heights = [
         plot_graph([(k, k + 1, 1) for k in range(4)]).figure.get_figheight(),

@@ -53,6 +53,8 @@ _CHARACTERS, _OF_TITLE = 16.5, 12.5
 _LEAST = 1e-9
 #: Up to when runs are shown, in units of ``T``.
 _LAST = 1.04
+#: How long steps of a bound are, in units of ``T``, whose corners are not joined.
+_FLAT = 0.1
 #: How dark tubes of all agents are together.
 _SHADE = 0.7
 #: Agents of which every one is named; of more those that begin highest and lowest. Up to how many lines are thick.
@@ -348,6 +350,30 @@ def _draw_error(ax: Axes, certificate: Certificate, time_unit: str) -> None:
     finished(ax, time_label("time $t$", time_unit), rf"$\|{z}(t)\| \,/\, \|{z}(0)\|$")
 
 
+def joined_above(t: np.ndarray, bound: np.ndarray, longest: float) -> np.ndarray:
+    """Return what lies on a bound, (M,), or above it, and joins the corners of its steps that are not the longest.
+
+    Between instants, too, it is not below a bound that falls, or rises, from the one to the other.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.glance import joined_above
+    >>> joined_above(np.arange(8.0), np.array([4, 4, 4, 2, 2, 2, 2, 0.0]), 5)
+    array([4. , 4. , 4. , 4. , 3.5, 3. , 2.5, 2. ])
+    """
+    known = np.flatnonzero(np.isfinite(bound))
+    if known.size < 2:
+        return bound
+    wide, times = bound[known], t[known]
+    wide = np.maximum.reduce([wide, np.append(wide[:1], wide[:-1]), np.append(wide[1:], wide[-1:])])
+    change = np.flatnonzero(np.diff(wide))
+    falls, begins = wide[change + 1] < wide[change], np.append(0, change + 1)
+    ends = np.append(change, wide.size - 1)
+    flat = times[ends] - times[begins] > longest
+    kept = np.unique([0, wide.size - 1, *change[falls], *(change[~falls] + 1), *begins[flat], *ends[flat]])
+    return np.concatenate([bound[: known[0]], np.interp(times, times[kept], wide[kept]), bound[known[-1] + 1 :]])
+
+
 def _draw_run(ax: Axes, certificate: Certificate, run: Any, ends: np.ndarray, time_unit: str) -> None:
     """Draw the run of every agent of one graph within its tube, with its state at ``T`` at the end of its line."""
     values, T = positions_of(run), float(run.protocol.gain.T)
@@ -368,7 +394,9 @@ def _draw_run(ax: Axes, certificate: Certificate, run: Any, ends: np.ndarray, ti
             ax.plot(run.t[until], values[k][until], color=colour, linewidth=width, gid=node_id(k, "run"))
             if tube is not None and np.isfinite(tube.low[k]).any():
                 shade: dict[str, Any] = {"alpha": _SHADE / max(5, len(values)), "linewidth": 0}
-                ax.fill_between(run.t[until], tube.low[k][until], tube.high[k][until], color=colour, **shade)
+                middle, half = (tube.high[k] + tube.low[k]) / 2, (tube.high[k] - tube.low[k]) / 2
+                half = joined_above(run.t, half, _FLAT * T)
+                ax.fill_between(run.t[until], (middle - half)[until], (middle + half)[until], color=colour, **shade)
         named = dict(enumerate(colours))
         if len(values) > _EACH:
             group = camp_groups(structure)
