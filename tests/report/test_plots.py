@@ -61,6 +61,7 @@ from ptcc_certify.report.plots.camp_lines import (
 from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.plots.distributions import plot_degrees, plot_final_states
+from ptcc_certify.report.plots.final_colours import colours_of
 from ptcc_certify.report.plots.glance import plot_glance
 from ptcc_certify.report.plots.graph import GROUND, plot_graph, weight_ranges
 from ptcc_certify.report.plots.graph_layout import FREE_NODES, arc
@@ -158,9 +159,9 @@ def shows(drawn: np.ndarray, row: np.ndarray, scale: float) -> bool:
 
 
 def agent_lines(ax: Axes) -> list[Line2D]:
-    """The lines of single agents: those of medians are thicker."""
-    camp_colours = {colour for colour, _ in CAMP_STYLES.values()}
-    return [line for line in ax.lines if line.get_color() in camp_colours and line.get_linewidth() < 2]
+    """The lines of single agents: those of means are thicker, those of bounds and deadlines have two points."""
+    lines = [line for line in ax.lines if line.get_linewidth() < 2 and line.get_linestyle() != "None"]
+    return [line for line in lines if len(line.get_xdata()) > 2]  # type: ignore[arg-type]
 
 
 def peak_of(ax: Axes) -> Annotation | None:
@@ -175,15 +176,20 @@ def test_each_of_few_agents_has_a_line_of_its_camp_and_its_name(name: str) -> No
     run = cert.trajectory
     assert run is not None and cert.graph.n_nodes <= NAMED_AGENTS
     states, ax = drawn(plot_trajectory(cert)), drawn(plot_input(cert))
+    ends = colours_of(run.states[:, -1], first=float(np.abs(run.states[:, 0]).max()))
+    several = set(camps(cert.structure)) if len(set(camps(cert.structure))) > 1 else set()
     for values, axes in ((run.states, states), (run.input, ax)):
         scale = np.abs(values[:, :1]).max()
         assert len(agent_lines(axes)) == cert.graph.n_nodes
-        for row, camp in zip(values, camps(cert.structure), strict=True):
+        for row, camp, end in zip(values, camps(cert.structure), ends, strict=True):
             colours = [line.get_color() for line in agent_lines(axes) if shows(line.get_ydata(), row, scale)]
-            assert any(same_color(colour, CAMP_STYLES[camp][0]) for colour in colours)
-        assert set(labelled(axes)) == {*camps(cert.structure), "deadline $T$"}
-        written = ", ".join(text.get_text() for text in axes.texts if text is not peak_of(axes))
+            want = to_rgb(end if axes is states else CAMP_STYLES[camp][0])
+            assert any(np.allclose(to_rgb(colour), want, atol=0.02) for colour in colours)
+        assert set(labelled(axes)) == (several if axes is states else {*camps(cert.structure), "deadline $T$"})
+        names = [text.get_text() for text in axes.texts if text is not peak_of(axes)]
+        written = ", ".join(name for name in names if not name.startswith("$T$"))
         assert set(cert.graph.labels) <= set(written.split(", ")) or "+" in written
+    assert any(text.get_text().startswith("$T$ = ") for text in states.texts)
     peak, text = cert.effort and cert.effort.peak, peak_of(ax)
     assert (text is None) == (peak is None)
     if text is not None and peak is not None:
@@ -199,14 +205,27 @@ def test_up_to_60_agents_have_lines_and_those_that_begin_highest_and_lowest_thei
     assert run is not None and NAMED_AGENTS < cert.graph.n_nodes <= LINE_AGENTS
     ax = drawn(plot_trajectory(cert))
     lines = {line.get_ydata().tobytes(): line for line in agent_lines(ax)}
-    for row, part in zip(run.states, group, strict=True):
-        assert same_color(lines[row.tobytes()].get_color(), CAMP_STYLES[part][0])
+    assert {row.tobytes() for row in run.states} == set(lines)
+    assert {line.get_color() for line in lines.values()} == set(colours_of(np.zeros(1)))  # all end at 0
     written = ", ".join(text.get_text() for text in ax.texts)
     for part in set(group):
         own = np.flatnonzero(group == part)
         assert len(own) > NAMED_OF_PART
         for end in (own[run.states[own, 0].argmin()], own[run.states[own, 0].argmax()]):
             assert cert.graph.labels[end] in written.split(", ")
+
+
+@pytest.mark.parametrize("name", ["fig3a", "parts", "moving"])
+def test_states_and_graph_have_the_colours_of_the_glance(name: str) -> None:
+    cert = read_certificate(CORPUS / f"{name}.json")
+    nodes, runs = (
+        {line.get_gid(): line.get_color() for line in ax.lines if line.get_gid()} for ax in plot_glance(cert).axes
+    )
+    n, states, graph = len(cert.labels), plot_trajectory(cert), plot_graph(cert)
+    assert sorted(line.get_color() for line in agent_lines(states)) == sorted(runs[f"run-{k}"] for k in range(n))
+    assert {line.get_gid(): line.get_color() for line in graph.lines if line.get_gid()} == nodes
+    assert all(same_color(line.get_color(), BEHIND) for line in labelled(states).values())  # type: ignore[attr-defined]
+    assert "$T$ = " in " ".join(text.get_text() for text in states.texts)
 
 
 @pytest.mark.few(0)
@@ -1026,7 +1045,7 @@ def test_names_at_the_end_stand_where_lines_end_in_the_figure() -> None:
     cert = certify_words(CHAIN, NominalProtocol(1, 1, 2, 1), [1, 3, -2, 4], method="perron", **MOVING["leaders"])
     run, ax = cert.asked_trajectory, drawn(plot_trajectory(cert))
     assert run is not None and run.t[-1] > ax.get_xlim()[1] > 1
-    ends = [text for text in ax.texts if text.xy[0] > 0]  # type: ignore[attr-defined]
+    ends = [text for text in ax.texts if text.xy[0] > 1]  # type: ignore[attr-defined]
     assert ends
     for text in ends:
         at = [np.interp(ax.get_xlim()[1], run.t, run.states[list(cert.graph.labels).index(k)]) for k in "abcd"]
@@ -1054,9 +1073,11 @@ def unseen_texts(ax: Axes) -> list[Text]:
 def test_every_figure_has_one_legend_above_its_axes() -> None:
     for name, figure in gallery().items():
         legends = [*figure.legends, *(ax.get_legend() for ax in figure.axes if ax.get_legend() is not None)]
-        assert len(legends) == 1, name
-        bottom = legends[0].get_window_extent().y0  # type: ignore[union-attr]
-        assert all(bottom >= ax.get_window_extent().y1 - 2 for ax in figure.axes), name
+        alone = name.endswith("plot_trajectory") and len(set(camps(certified(name.split()[0]).structure))) == 1
+        assert len(legends) == (not alone), name  # lines of one part need no legend
+        for legend in legends:
+            bottom = legend.get_window_extent().y0  # type: ignore[union-attr]
+            assert all(bottom >= ax.get_window_extent().y1 - 2 for ax in figure.axes), name
 
 
 def test_every_figure_names_the_unit_of_time() -> None:

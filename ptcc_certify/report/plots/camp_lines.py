@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 from scipy.optimize import isotonic_regression
 
+from lmi.exact.decimal_rounding import near
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import Structure, analyse, find_camps
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, STEPS, tick_count
@@ -115,10 +116,12 @@ def draw_agents(
     structure: Structure,
     *,
     size: bool = False,
+    colours: Sequence[str] | None = None,
     **style: Any,
 ) -> dict[int, str]:
     """Draw a quantity of every agent, (N, M), in the colours and lines of camps; return the colours of named lines.
 
+    If up to 60 agents have ``colours`` of their own, lines alone tell camps, and the legend, if there are several.
     Named are those of :func:`named_of_part`. Of more than 60 agents a part of more than twelve is drawn as its range
     and mean, and has no lines but theirs; of a ``size``, which is never negative, as what is below the largest.
     """
@@ -126,24 +129,30 @@ def draw_agents(
     group = camp_groups(structure) if played is None else family_groups(played.family)
     named: dict[int, str] = {}
     step: Any = "post" if style.get("drawstyle") == "steps-post" else None
-    few, ranges = len(group) <= NAMED_AGENTS, False
+    few, ranges, many = len(group) <= NAMED_AGENTS, False, len(group) > LINE_AGENTS
+    own = None if many else colours
     for name, (colour, line) in CAMP_STYLES.items():
-        members, label = np.flatnonzero(group == name), name
+        members, label = np.flatnonzero(group == name), name if own is None else ""
+        if own is not None and 0 < members.size < len(group):
+            ax.plot([], [], color=BEHIND, linestyle=line, label=name)
+        elif own is not None:
+            line = "-"  # there is nothing to tell apart
         ends = named_of_part(members, values, size=size)
         if len(ends) < members.size:
             rows = np.nan_to_num(values[members])
-            if len(group) > LINE_AGENTS and members.size > LINES_OF_PART:
+            if many and members.size > LINES_OF_PART:
                 high, low = rows.max(axis=0), 0 if size else rows.min(axis=0)
                 ax.fill_between(run.t, low, high, color=colour, alpha=0.2, linewidth=0, step=step)
                 middle = high if size else rows.mean(axis=0)
                 ax.plot(run.t, middle, color=colour, linestyle=line, linewidth=2, label=name, **style)
                 members, label, ranges = ends, "", True
         width = (0.9 if name == "followers" else 1.5) if few else 0.6
-        for v in members:
+        for v in members.tolist():
             thick = width if few or v not in ends else 1.1
-            ax.plot(run.t, values[v], label=label or None, color=colour, linestyle=line, linewidth=thick, **style)
+            shade = colour if own is None else own[v]
+            ax.plot(run.t, values[v], label=label or None, color=shade, linestyle=line, linewidth=thick, **style)
             label = ""
-        named |= {int(v): colour for v in ends}
+        named |= {int(v): colour if own is None else own[v] for v in ends}
     if ranges:
         ax.fill_between([], [], color=BEHIND, alpha=0.3, label="largest" if size else "mean and range")
     return named
@@ -167,14 +176,23 @@ def named_of_part(members: np.ndarray, values: np.ndarray, *, size: bool = False
     return members[sorted({int(first.argmax())} | (set() if size else {int(first.argmin())}))]
 
 
-def draw_deadlines(ax: Axes, run: Trajectory | AgentsTrajectory) -> None:
-    """Draw the deadline, and where sliding variables move that of theirs, as vertical lines."""
+def draw_deadlines(ax: Axes, run: Trajectory | AgentsTrajectory, *, told: bool = False) -> None:
+    """Draw the deadline, and where sliding variables move that of theirs, as vertical lines.
+
+    They are named in the legend; or ``told`` beside the tops of their lines.
+    """
+    lines: list[tuple[Any, Any, str, str]] = []
     if isinstance(run, AgentsTrajectory) or run.protocol.prescribed:
-        ax.axvline(float(run.protocol.gain.T), color="black", linewidth=0.8, linestyle=":", label="deadline $T$")
+        lines.append((run.protocol.gain.T, ":", "$T$", "deadline $T$"))
     sliding = run.sliding if isinstance(run, Trajectory) else None
     if sliding is not None and sliding.sigma0.any():
-        reached = float(sliding.protocol.T_r)
-        ax.axvline(reached, color="black", linewidth=0.8, linestyle=(0, (5, 2, 1, 2)), label="$T_r$")
+        lines.append((sliding.protocol.T_r, (0, (5, 2, 1, 2)), "$T_r$", "$T_r$"))
+    beside: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "ha": "right"}
+    beside |= {"va": "top", "fontsize": NAME_SIZE, "path_effects": HALO}
+    for at, dashes, name, label in lines:
+        ax.axvline(float(at), color="black", linewidth=0.8, linestyle=dashes, label=None if told else label)
+        if told:
+            ax.annotate(f"{name} = {near(at)}", (float(at), 1), (-3, -2), **beside)
 
 
 def name_agents(

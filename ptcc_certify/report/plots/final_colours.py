@@ -68,8 +68,14 @@ def colours_of(ends: np.ndarray, largest: float | None = None, first: float = 0)
 
 
 def colours_at_end(certificate: Certificate, run: Any) -> list[str] | None:
-    """Return the colour of every agent, by its state at ``T``; None of families, and where no state is known there."""
-    ends = final_states(certificate, run)
+    """Return the colour of every agent, by its state at ``T``; None of families, and where no state is known there.
+
+    None, too, where one is beyond the range of floats.
+    """
+    try:
+        ends = final_states(certificate, run)
+    except ParameterError:
+        return None
     if certificate.of_family or np.isnan(ends).all():
         return None
     first = positions_of(run)[:, 0] if run is not None else [float(x) for x in certificate.initial_state or ()]

@@ -13,7 +13,6 @@ from matplotlib import style
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
-from lmi.exact.decimal_rounding import near
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.fact import Fact
 from ptcc_certify.certificate.tube import tube_of
@@ -21,7 +20,14 @@ from ptcc_certify.errors import ParameterError, SimulationError, spell
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, LABELLED_NODES, REPEATED_NODES
 from ptcc_certify.report.facts.claim import assumptions
 from ptcc_certify.report.facts.of_certificate import facts_of
-from ptcc_certify.report.plots.camp_lines import LINE_AGENTS, camp_groups, draw_agents, name_agents, named_of_part
+from ptcc_certify.report.plots.camp_lines import (
+    LINE_AGENTS,
+    camp_groups,
+    draw_agents,
+    draw_deadlines,
+    name_agents,
+    named_of_part,
+)
 from ptcc_certify.report.plots.decay import NothingDecays
 from ptcc_certify.report.plots.distributions import plot_final_states
 from ptcc_certify.report.plots.final_colours import at_deadline, colours_at_end, final_states, positions_of
@@ -410,14 +416,8 @@ def _draw_run(ax: Axes, certificate: Certificate, run: Any, ends: np.ndarray, ti
     least, most = float(seen.min()), float(seen.max())
     room = 0.06 * (most - least) or 1.0
     ax.set_ylim(least - room, most + room)
-    ax.axvline(T, color="black", linewidth=0.8, linestyle=":")
     name_agents(ax, run, values, named, ends=True, until=_LAST * T, told=ends)
-    deadline: dict[str, Any] = {"textcoords": "offset points", "ha": "right", "va": "top", "fontsize": 7}
-    ax.annotate(f"$T$ = {near(run.protocol.gain.T)}", (T, most + room), (-3, -2), **deadline)
-    if isinstance(run, Trajectory) and run.sliding is not None and run.sliding.sigma0.any():
-        reached = float(run.sliding.protocol.T_r)
-        ax.axvline(reached, color="black", linewidth=0.8, linestyle=(0, (5, 2, 1, 2)))
-        ax.annotate(f"$T_r$ = {near(run.sliding.protocol.T_r)}", (reached, most + room), (-3, -2), **deadline)
+    draw_deadlines(ax, run, told=True)
     part = certificate.proof.agents
     name = "state $x_k$" if part is None and certificate.proof.velocities is None else "position"
     finished(ax, time_label("time $t$", time_unit), f"{name}, coordinate 1" if part and part.dimension > 1 else name)
