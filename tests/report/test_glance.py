@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bad_inputs import ptcc as command
+from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from PIL import Image
 
@@ -14,7 +15,9 @@ import ptcc_certify as ptcc
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.animation import animate
-from ptcc_certify.report.plots.glance import ENDS, colours_of, plot_glance
+from ptcc_certify.report.plots.camp_lines import _written
+from ptcc_certify.report.plots.final_colours import ENDS, colours_of
+from ptcc_certify.report.plots.glance import joined_above, plot_glance
 from ptcc_certify.report.plots.graph import node_id
 
 CORPUS = Path(__file__).parents[1] / "corpus"
@@ -41,7 +44,7 @@ def certificate(name: str) -> ptcc.Certificate:
 def test_every_run_is_drawn_inside_its_tube(name: str) -> None:
     figure = plot_glance(certificate(name))
     ax = figure.axes[1]
-    lines = {line.get_gid(): line for line in ax.lines if line.get_gid()}
+    lines = {line.get_gid(): line for line in ax.lines if str(line.get_gid()).startswith("run")}
     assert len(lines) == len(certificate(name).labels) == len(ax.collections)
     room = 1e-6 * np.ptp(ax.get_ylim())
     for k, tube in enumerate(ax.collections):
@@ -52,6 +55,22 @@ def test_every_run_is_drawn_inside_its_tube(name: str) -> None:
         low, high = (np.interp(t, rim[:, 0], rim[:, 1]) for rim in rims)
         least, most = np.minimum(low, high), np.maximum(low, high)
         assert (least - room <= x).all() and (x <= most + room).all(), k
+
+
+@pytest.mark.parametrize("name", ["late-missed", "late-capped", "vehicles-formation"])
+def test_steps_of_a_bound_are_joined_and_none_of_it_is_cut_off(name: str) -> None:
+    cert = certificate(name)
+    T, t = float(cert.protocol.T), cert.asked_trajectory.t
+    tube, fine = cert.tube(t), np.linspace(0, T, 20011)
+    sharp = cert.tube(fine)
+    for k in range(len(cert.labels)):
+        half = (tube.high[k] - tube.low[k]) / 2
+        joined = joined_above(t, half, 0.1 * T)
+        known = np.isfinite(half)
+        assert (joined[known] >= half[known] * (1 - 1e-12)).all()
+        assert (np.interp(fine, t, joined) >= (sharp.high[k] - sharp.low[k]) / 2 * (1 - 1e-9) - 1e-12).all()
+        before = t < 0.9 * T
+        assert np.sum(np.diff(joined[before]) == 0) <= np.sum(np.diff(half[before]) == 0)
 
 
 def test_colours_tell_the_sign_of_a_state_and_are_legible_on_white_and_under_white() -> None:
@@ -71,6 +90,59 @@ def test_final_states_stand_at_the_ends_of_lines_each_its_own() -> None:
         for name in names.split(", "):
             assert abs(float(final[name]) - value) <= 0.01, name
     assert sum(len(names.split(", ")) for names in ends) == 16
+
+
+def ends_told(ax: Axes) -> list[tuple[str, float]]:
+    """The names at the ends of lines, and the values beside them."""
+    texts = [text.get_text().replace("\n", " ") for text in ax.texts]
+    return [(text.rpartition(": ")[0], float(text.rpartition(": ")[2])) for text in texts if ": " in text]
+
+
+def test_noise_of_the_integrator_has_no_colour_and_no_labels_of_its_own() -> None:
+    ax = plot_glance(certificate("sampled")).axes[1]
+    assert ends_told(ax) == [("1, 2, 3, 4, 5, 6", 0)]
+    assert {line.get_color() for line in ax.lines if line.get_gid()} == set(colours_of(np.zeros(1)))
+
+
+def test_a_proved_end_that_is_not_reached_in_time_is_a_point_at_the_deadline() -> None:
+    ax = plot_glance(certificate("odd-labels")).axes[1]
+    points = [line.get_xydata()[0].tolist() for line in ax.lines if str(line.get_gid()).startswith("end")]
+    assert points == [[1, 0]] * 3 and ax.get_ylim()[0] < 0
+    assert not [line for line in plot_glance(certificate("fig3a")).axes[1].lines if "end" in str(line.get_gid())]
+
+
+def made(n: int, cut: int) -> ptcc.Certificate:
+    """A ring in two camps, of which the first has so many agents."""
+    ends = [(k, (k + step) % n) for k in range(n) for step in (1, 7)]
+    edges = [(f"a{j}", f"a{k}", -1 if (j < cut) != (k < cut) else 1) for j, k in ends]
+    protocol = ptcc.NominalProtocol(T=1, rho1=1, rho2=9, kappa=2)
+    return ptcc.certify(edges, protocol, [3 - k % 11 * 0.5 for k in range(n)], asks=ptcc.Asks(method="paper"))
+
+
+@pytest.mark.parametrize(("n", "lines"), [(45, 45), (64, 4)])
+def test_of_many_agents_labels_count_all_who_end_there(n: int, lines: int) -> None:
+    cert = made(n, 20)
+    ax = plot_glance(cert).axes[1]
+    assert sum(line.get_linewidth() < 2 and len(line.get_xdata()) > 2 for line in ax.lines) == lines
+    assert len(ax.collections) >= (n if lines == n else 2)
+    final = [float(x) for x in cert.proof.final_state.states]
+    for names, value in ends_told(ax):
+        shown, _, more = names.replace(" agents", "").rpartition("+")
+        counted = len(shown.strip(", ").split(", ")) + int(more) if shown else int(more)
+        assert counted == sum(abs(x - value) < 0.01 for x in final), names
+    assert len(ends_told(ax)) == 2
+
+
+def test_up_to_60_agents_are_coloured_by_where_they_end() -> None:
+    cert = made(45, 20)
+    lines = {line.get_gid(): line.get_color() for line in plot_glance(cert).axes[1].lines if line.get_gid()}
+    ends = colours_of(np.array([float(x) for x in cert.proof.final_state.states]))
+    assert [lines[node_id(k, "run")] for k in range(45)] == ends
+
+
+def test_names_fill_two_lines_before_they_are_counted() -> None:
+    assert _written([f"agent{k}" for k in range(6)], ": 0", 20) == "agent0, agent1,\nagent2, +3: 0"
+    assert _written(["lead", "ann", "bob"], ": 1", 12) == "lead, ann,\nbob: 1"
 
 
 def test_words_say_the_claim_and_the_bounds() -> None:
@@ -164,9 +236,40 @@ def test_what_was_asked_is_told_beside_a_claim_that_is_proved(name: str) -> None
     assert "certified" not in texts and told[9:30] == read.facts()[-1].text[:21]
 
 
-def test_numerical_bounds_are_named() -> None:
-    titles = [plot_glance(certificate(name)).axes[1].get_title(loc="left") for name in ("sliding", "sliding-rest")]
-    assert titles == ["shaded: bounds integrated in floats (numerical)", ""]
+def test_what_shades_and_colours_tell_is_named() -> None:
+    titles = [plot_glance(certificate(name)).axes[1].get_title(loc="left") for name in ("sliding", "fig3a", "gain-cap")]
+    colour = "colour: state at $T$"
+    assert titles == [f"shaded: bounds in floats (numerical); {colour}", f"shaded: proved; {colour}", colour]
+    legend = plot_glance(certificate("fig1b")).axes[0].figure.legends[0]
+    assert "leads" in [text.get_text() for text in legend.get_texts()]
+    assert "$T_r$ = 0.5" in [text.get_text() for text in plot_glance(certificate("sliding")).axes[1].texts]
+
+
+@pytest.mark.parametrize(
+    ("name", "title", "note"),
+    [
+        (
+            "late",
+            "Late messages: every agent within 0.000361 of",
+            "nothing late: interval bipartite consensus at T = 1",
+        ),
+        ("moving", "Moving leaders, disturbances: every follower on its", "leaders at rest, without disturbances: int"),
+        (
+            "late-own",
+            "Late messages under a gain cap: every agent within 0.136",
+            "without limits, nothing late: bipart",
+        ),
+        ("sampled", "Gain \u2264 20, zero-order hold 0.001", "without limits: stability at T = 1 (Theorem 1.2)"),
+        ("sampled-slowly", "Under limits of the gain: nothing is proved", "without limits: stability at T = 1"),
+        ("parts", "a, b, c: bipartite consensus at T = 1", "error: "),
+    ],
+)
+def test_titles_say_what_was_asked_and_never_deny_what_is_drawn(name: str, title: str, note: str) -> None:
+    texts = [text.get_text() for text in plot_glance(certificate(name)).texts]
+    assert " ".join(texts).startswith(title)
+    assert any(text.startswith(note) for text in texts)
+    for text in texts:
+        assert not text.endswith((" =", " \u2264", "Theorem", " 0.99")) and not text.startswith(("%", "=", "\u2264"))
 
 
 @pytest.mark.parametrize(

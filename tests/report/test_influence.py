@@ -12,6 +12,7 @@ import pytest
 from bad_inputs import ptcc as command
 from generators import made_graphs
 from hypothesis import given
+from matplotlib.colors import to_rgb
 
 import ptcc_certify as ptcc
 from ptcc_certify.errors import ParameterError
@@ -56,11 +57,35 @@ def test_the_heat_map_has_the_weights_of_all():
     rows, columns = ([tick.get_text() for tick in ticks] for ticks in (ax.get_yticklabels(), ax.get_xticklabels()))
     who = ptcc.influence("fig5a").to_pandas()
     places = [(text.get_position(), float(text.get_text())) for text in ax.texts]
-    assert len(places) == int((who != 0).sum().sum()) > 30
+    written = [weight for _, weight in places if weight]
+    assert len(written) == int((who != 0).sum().sum()) > 30
+    assert len(places) - len(written) == int((who == 0).all(axis=1).sum()) * len(columns) > 0  # who ends at 0
     for (x, y), weight in places:
         assert abs(who.loc[rows[round(y)], columns[round(x)]] - weight) <= 0.005, (x, y)
     with pytest.raises(ParameterError, match="all end at 0"):
         plot_influence("fig1a")
+
+
+def test_weights_stand_out_from_their_cells_and_the_bar_says_what_it_is_of():
+    ax = plot_influence("fig5a")
+    (cells,) = ax.collections
+    colours = cells.cmap(cells.norm(cells.get_array()))[..., :3]
+
+    def luminance(colour):
+        linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour]
+        return float(np.dot([0.2126, 0.7152, 0.0722], linear)) + 0.05
+
+    for text in ax.texts:
+        column, row = text.get_position()
+        pair = luminance(to_rgb(text.get_color())), luminance(colours[row, column])
+        assert max(pair) / min(pair) >= 4.5
+    assert ax.figure.axes[1].get_ylabel() == "weight in $x(T)$"
+
+
+def test_rows_of_up_to_60_nodes_are_named():
+    for n in (60, 61):
+        ax = plot_influence([("a0", f"a{k}", 1) for k in range(1, n)])
+        assert len(ax.get_yticklabels()) == (n if n == 60 else 0)
 
 
 def test_the_command_prints_writes_and_draws(tmp_path: Path):

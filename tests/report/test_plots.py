@@ -61,6 +61,7 @@ from ptcc_certify.report.plots.camp_lines import (
 from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.plots.distributions import plot_degrees, plot_final_states
+from ptcc_certify.report.plots.final_colours import colours_of
 from ptcc_certify.report.plots.glance import plot_glance
 from ptcc_certify.report.plots.graph import GROUND, plot_graph, weight_ranges
 from ptcc_certify.report.plots.graph_layout import FREE_NODES, arc
@@ -68,7 +69,7 @@ from ptcc_certify.report.plots.input import plot_effort, plot_input
 from ptcc_certify.report.plots.motion import plot_formation, plot_motion
 from ptcc_certify.report.plots.sizes import DOUBLE_COLUMN, SINGLE_COLUMN, figures_for
 from ptcc_certify.report.plots.spectrum import CLASS_MARKERS, plot_frontier, plot_spectrum
-from ptcc_certify.report.plots.style import EDGE_STYLES, STYLE, save_figure
+from ptcc_certify.report.plots.style import BEHIND, BOUND, EDGE_STYLES, STYLE, save_figure
 from ptcc_certify.report.plots.tracking import plot_tracking
 from ptcc_certify.report.plots.trade_off import plot_trade_off
 from ptcc_certify.report.plots.trajectory import plot_run, plot_sliding, plot_trajectory
@@ -82,6 +83,7 @@ pytestmark = [
     pytest.mark.usefixtures("quick_search"),
 ]
 
+CORPUS = Path(__file__).parents[1] / "corpus"
 STYLE_FILE = Path(ptcc_certify.__file__).with_name("ptcc.mplstyle")
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 NAMES = ("fig1a", "fig3b", "fig5b", "apart", "single")
@@ -157,9 +159,9 @@ def shows(drawn: np.ndarray, row: np.ndarray, scale: float) -> bool:
 
 
 def agent_lines(ax: Axes) -> list[Line2D]:
-    """The lines of single agents: those of medians are thicker."""
-    camp_colours = {colour for colour, _ in CAMP_STYLES.values()}
-    return [line for line in ax.lines if line.get_color() in camp_colours and line.get_linewidth() < 2]
+    """The lines of single agents: those of means are thicker, those of bounds and deadlines have two points."""
+    lines = [line for line in ax.lines if line.get_linewidth() < 2 and line.get_linestyle() != "None"]
+    return [line for line in lines if len(line.get_xdata()) > 2]  # type: ignore[arg-type]
 
 
 def peak_of(ax: Axes) -> Annotation | None:
@@ -174,15 +176,20 @@ def test_each_of_few_agents_has_a_line_of_its_camp_and_its_name(name: str) -> No
     run = cert.trajectory
     assert run is not None and cert.graph.n_nodes <= NAMED_AGENTS
     states, ax = drawn(plot_trajectory(cert)), drawn(plot_input(cert))
+    ends = colours_of(run.states[:, -1], first=float(np.abs(run.states[:, 0]).max()))
+    several = set(camps(cert.structure)) if len(set(camps(cert.structure))) > 1 else set()
     for values, axes in ((run.states, states), (run.input, ax)):
         scale = np.abs(values[:, :1]).max()
         assert len(agent_lines(axes)) == cert.graph.n_nodes
-        for row, camp in zip(values, camps(cert.structure), strict=True):
+        for row, camp, end in zip(values, camps(cert.structure), ends, strict=True):
             colours = [line.get_color() for line in agent_lines(axes) if shows(line.get_ydata(), row, scale)]
-            assert any(same_color(colour, CAMP_STYLES[camp][0]) for colour in colours)
-        assert set(labelled(axes)) == {*camps(cert.structure), "deadline $T$"}
-        written = ", ".join(text.get_text() for text in axes.texts if text is not peak_of(axes))
+            want = to_rgb(end if axes is states else CAMP_STYLES[camp][0])
+            assert any(np.allclose(to_rgb(colour), want, atol=0.02) for colour in colours)
+        assert set(labelled(axes)) == (several if axes is states else {*camps(cert.structure), "deadline $T$"})
+        names = [text.get_text() for text in axes.texts if text is not peak_of(axes)]
+        written = ", ".join(name for name in names if not name.startswith("$T$"))
         assert set(cert.graph.labels) <= set(written.split(", ")) or "+" in written
+    assert any(text.get_text().startswith("$T$ = ") for text in states.texts)
     peak, text = cert.effort and cert.effort.peak, peak_of(ax)
     assert (text is None) == (peak is None)
     if text is not None and peak is not None:
@@ -198,14 +205,27 @@ def test_up_to_60_agents_have_lines_and_those_that_begin_highest_and_lowest_thei
     assert run is not None and NAMED_AGENTS < cert.graph.n_nodes <= LINE_AGENTS
     ax = drawn(plot_trajectory(cert))
     lines = {line.get_ydata().tobytes(): line for line in agent_lines(ax)}
-    for row, part in zip(run.states, group, strict=True):
-        assert same_color(lines[row.tobytes()].get_color(), CAMP_STYLES[part][0])
+    assert {row.tobytes() for row in run.states} == set(lines)
+    assert {line.get_color() for line in lines.values()} == set(colours_of(np.zeros(1)))  # all end at 0
     written = ", ".join(text.get_text() for text in ax.texts)
     for part in set(group):
         own = np.flatnonzero(group == part)
         assert len(own) > NAMED_OF_PART
         for end in (own[run.states[own, 0].argmin()], own[run.states[own, 0].argmax()]):
             assert cert.graph.labels[end] in written.split(", ")
+
+
+@pytest.mark.parametrize("name", ["fig3a", "parts", "moving"])
+def test_states_and_graph_have_the_colours_of_the_glance(name: str) -> None:
+    cert = read_certificate(CORPUS / f"{name}.json")
+    nodes, runs = (
+        {line.get_gid(): line.get_color() for line in ax.lines if line.get_gid()} for ax in plot_glance(cert).axes
+    )
+    n, states, graph = len(cert.labels), plot_trajectory(cert), plot_graph(cert)
+    assert sorted(line.get_color() for line in agent_lines(states)) == sorted(runs[f"run-{k}"] for k in range(n))
+    assert {line.get_gid(): line.get_color() for line in graph.lines if line.get_gid()} == nodes
+    assert all(same_color(line.get_color(), BEHIND) for line in labelled(states).values())  # type: ignore[attr-defined]
+    assert "$T$ = " in " ".join(text.get_text() for text in states.texts)
 
 
 @pytest.mark.few(0)
@@ -336,6 +356,19 @@ def test_with_late_messages_their_bound_of_the_input_is_drawn_and_not_that_of_me
     assert not any("certified peak" in text for text in texts)
     punctual = [text.get_text() for text in drawn(plot_input(cert.trajectory, certificate=cert)).texts]
     assert any("certified peak" in text and "messages at once" in text for text in punctual)
+
+
+@pytest.mark.parametrize(
+    ("name", "bounds", "scale"),
+    [("group-vehicles", [290.4], "symlog"), ("late-capped", [36.75], "linear"), ("fig5a", [380], "linear")],
+)
+def test_bounds_of_the_run_that_is_drawn_are_lines_in_sight(name: str, bounds: list[float], scale: str) -> None:
+    ax = drawn(plot_input(CORPUS / f"{name}.json"))
+    told = [text for text in ax.texts if "peak" in text.get_text() or "at most" in text.get_text()]
+    assert [text.xy[1] for text in told] == pytest.approx(bounds, rel=1e-3)  # type: ignore[attr-defined]
+    dashed = [line.get_ydata()[0] for line in ax.lines if line.get_linestyle() == "--" and len(line.get_ydata()) == 2]
+    assert dashed == pytest.approx([sign * bound for bound in bounds for sign in (1, -1)], rel=1e-3)
+    assert ax.get_yscale() == scale and ax.get_ylim()[1] > max(bounds)
 
 
 def test_a_held_input_is_drawn_in_steps_where_every_period_is_sampled() -> None:
@@ -473,6 +506,24 @@ def test_a_weight_stands_where_no_other_arrow_crosses() -> None:
         box = Text.get_window_extent(weight)
         others = np.concatenate(curves[:k] + curves[k + 1 :])
         assert not box.count_contains(others), weight
+
+
+def test_no_weight_hides_an_arrowhead() -> None:
+    for name in ("switching", "dwell", "late-camps"):
+        figure = plot_glance(CORPUS / f"{name}.json")
+        FigureCanvasAgg(figure).draw()
+        first = figure.axes[0]
+        for ax in first.child_axes or [first]:
+            weights = [patch.get_window_extent() for t in ax.texts if (patch := t.get_bbox_patch()) is not None]
+            for arrow in arrows_in(ax):
+                paths, _ = arrow._get_path_in_displaycoord()  # type: ignore[attr-defined]
+                heads = [
+                    Bbox([corners.min(axis=0), corners.max(axis=0)]) for corners in (p.vertices[:3] for p in paths[1:])
+                ]
+                for head in heads:
+                    shared = [Bbox.intersection(box, head) for box in weights]
+                    covered = max((one.width * one.height for one in shared if one is not None), default=0)
+                    assert covered <= 0.25 * head.width * head.height, (name, covered)
 
 
 def test_a_flat_graph_has_a_flat_figure() -> None:
@@ -658,10 +709,11 @@ def test_the_run_that_is_drawn_is_the_one_that_was_asked(title: str) -> None:
     run = simulate(graph, protocol, x0, actuator=next(iter(ASKED[title].get("limits", ())), None), **acts)
     ends = [line.get_ydata()[-1] for line in agent_lines(states)]  # type: ignore[index]
     assert sorted(ends) == pytest.approx(sorted(run.states[:, -1]), abs=1e-6)
-    bounds = [line.get_label() for line in drawn_axes[1].lines if "bound" in str(line.get_label())]
-    assert all(
-        str(label).endswith(("nothing late", "nothing inexact", "leaders at rest", "no limits")) for label in bounds
-    )
+    decay = drawn(drawn_axes[1])
+    (bound,) = [line for line in decay.lines if line.get_label() == "proved without these"]
+    assert same_color(bound.get_color(), BEHIND) and bound.get_linewidth() < 1
+    assert not any(same_color(line.get_color(), BOUND) for line in decay.lines)  # none that the run may cross
+    assert decay.get_window_extent().height >= 0.55 * decay.figure.bbox.height
 
 
 def test_where_delays_are_too_short_for_a_run_the_states_say_that_they_are_without() -> None:
@@ -993,7 +1045,7 @@ def test_names_at_the_end_stand_where_lines_end_in_the_figure() -> None:
     cert = certify_words(CHAIN, NominalProtocol(1, 1, 2, 1), [1, 3, -2, 4], method="perron", **MOVING["leaders"])
     run, ax = cert.asked_trajectory, drawn(plot_trajectory(cert))
     assert run is not None and run.t[-1] > ax.get_xlim()[1] > 1
-    ends = [text for text in ax.texts if text.xy[0] > 0]  # type: ignore[attr-defined]
+    ends = [text for text in ax.texts if text.xy[0] > 1]  # type: ignore[attr-defined]
     assert ends
     for text in ends:
         at = [np.interp(ax.get_xlim()[1], run.t, run.states[list(cert.graph.labels).index(k)]) for k in "abcd"]
@@ -1021,9 +1073,11 @@ def unseen_texts(ax: Axes) -> list[Text]:
 def test_every_figure_has_one_legend_above_its_axes() -> None:
     for name, figure in gallery().items():
         legends = [*figure.legends, *(ax.get_legend() for ax in figure.axes if ax.get_legend() is not None)]
-        assert len(legends) == 1, name
-        bottom = legends[0].get_window_extent().y0  # type: ignore[union-attr]
-        assert all(bottom >= ax.get_window_extent().y1 - 2 for ax in figure.axes), name
+        alone = name.endswith("plot_trajectory") and len(set(camps(certified(name.split()[0]).structure))) == 1
+        assert len(legends) == (not alone), name  # lines of one part need no legend
+        for legend in legends:
+            bottom = legend.get_window_extent().y0  # type: ignore[union-attr]
+            assert all(bottom >= ax.get_window_extent().y1 - 2 for ax in figure.axes), name
 
 
 def test_every_figure_names_the_unit_of_time() -> None:
@@ -1032,7 +1086,7 @@ def test_every_figure_names_the_unit_of_time() -> None:
         assert plot(cert, time_unit="ms").get_xlabel() == "time $t$ (ms)"
         assert plot(cert).get_xlabel() == "time $t$"
     assert plot_decay(cert, axis="time", time_unit="ms").get_xlabel() == "time $t$ (ms)"
-    assert {ax.get_xlabel() for ax in plot_run(cert, time_unit="s").axes} == {"time $t$ (s)"}
+    assert [ax.get_xlabel() for ax in plot_run(cert, time_unit="s").axes] == ["", "time $t$ (s)"]
 
 
 def test_every_figure_has_one_signature() -> None:
@@ -1220,7 +1274,7 @@ def test_names_of_agents_that_end_at_one_place_do_not_cover_each_other():
 
 
 @pytest.mark.few(0)
-def test_coordinates_of_agents_stand_below_each_other_and_side_by_side_in_a_wide_figure():
+def test_coordinates_in_the_plane_stand_side_by_side():
     pair = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
     cert = ptcc_certify.certify(
@@ -1230,10 +1284,11 @@ def test_coordinates_of_agents_stand_below_each_other_and_side_by_side_in_a_wide
         agents=ptcc_certify.Agents(order=2),
         asks=ptcc_certify.Asks(method="paper", simulation=False),
     )
-    for wide, shape in ((False, (4, 1)), (True, (2, 2))):
+    for wide in (False, True):
         axes = ptcc_certify.plot_motion(cert, wide=wide).axes
-        assert axes[0].get_subplotspec().get_gridspec().get_geometry() == shape
-        assert {ax.get_ylabel() for ax in axes} == {"position 1", "position 2", "velocity 1", "velocity 2"}
+        assert axes[0].get_subplotspec().get_gridspec().get_geometry() == (2, 2)
+        assert [ax.get_ylabel() for ax in axes] == ["position x", "position y", "velocity x", "velocity y"]
+        assert [ax.get_xlabel() for ax in axes] == ["", "", "time $t$", "time $t$"]
         assert len({(ax.get_xlim(), tuple(ax.get_xticks())) for ax in axes}) == 1
         for ax in axes:  # velocities begin at 0, and are named where they are largest
             assert sorted(text.get_text() for text in ax.texts) == ["a", "b"]
@@ -1249,6 +1304,12 @@ def test_a_motion_names_its_agents_and_all_panels_have_the_same_times():
     assert [sorted(text.get_text() for text in ax.texts) for ax in panels[:2]] == [["ann", "bob"], ["ann, bob"]]
     assert len(panels) == 4 and {ax.get_xlim() for ax in panels} == {panels[1].get_xlim()}
     assert "deadline $T$" in {text.get_text() for text in panels[0].get_legend().get_texts()}
+
+
+def test_states_and_sliding_variables_have_the_same_times() -> None:
+    upper, lower = plot_run(certified("sliding")).axes
+    assert upper.get_xlim() == lower.get_xlim() and list(upper.get_xticks()) == list(lower.get_xticks())
+    assert (upper.get_xlabel(), lower.get_xlabel()) == ("", "time $t$")
 
 
 @pytest.mark.few(0)

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 from scipy.optimize import isotonic_regression
 
+from lmi.exact.decimal_rounding import near
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import Structure, analyse, find_camps
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, STEPS, tick_count
@@ -28,17 +29,19 @@ CAMP_STYLES: dict[str, tuple[str, Any]] = {
     "followers": (BEHIND, (0, (3, 1.5))),
     "agents": (BEHIND, "-"),
 }
-#: Agents of which each has a line; agents, and agents of one part of a graph, of which each has its name.
-LINE_AGENTS, NAMED_AGENTS, NAMED_OF_PART = 60, 8, 3
+#: Agents of which each has a line, and of one part of a graph of more; of which each has its name, and of one part.
+LINE_AGENTS, LINES_OF_PART, NAMED_AGENTS, NAMED_OF_PART = 60, 12, 8, 3
 #: Size in points of names, and columns of a name; points that the label of a tick takes.
 NAME_SIZE, NAME_LENGTH, TICK_ROOM = 7, 18, 24
 #: Columns below which no name is broken to stand at both ends; how much wider than others letters may be.
 SHORT, WIDER = 6, 1.1
 #: The least share of the width of a panel for the time up to ``T``; points beside it for the axis and its label, and
 #: between a line and its name.
-TIME_SHARE, AXIS_ROOM, NAME_GAP = 0.55, 40, 10
+TIME_SHARE, AXIS_ROOM, NAME_GAP = 0.5, 40, 10
 #: How far beyond ``T`` a figure goes, and how far if nothing changes by more than such a share there.
 LATEST, AFTER, CALM = 1.2, 1.1, 0.01
+#: How far a line may be from a value that is told of ``T``, as a share of the axis, and lead to it.
+ARRIVED = 0.02
 #: What keeps a name legible upon lines.
 HALO = [patheffects.withStroke(linewidth=2, foreground="white")]
 
@@ -113,50 +116,83 @@ def draw_agents(
     structure: Structure,
     *,
     size: bool = False,
+    colours: Sequence[str] | None = None,
     **style: Any,
 ) -> dict[int, str]:
     """Draw a quantity of every agent, (N, M), in the colours and lines of camps; return the colours of named lines.
 
-    Of up to eight agents each is named; of more, in a part of the graph with more than three, the agent whose quantity
-    is the largest at first, and that with the least. Of more than 60 agents such a part is drawn as its range and mean,
-    and has no lines but these two; of a ``size``, which is never negative, as what is below the largest.
+    If up to 60 agents have ``colours`` of their own, lines alone tell camps, and the legend, if there are several.
+    Named are those of :func:`named_of_part`. Of more than 60 agents a part of more than twelve is drawn as its range
+    and mean, and has no lines but theirs; of a ``size``, which is never negative, as what is below the largest.
     """
     played = run.played if isinstance(run, Trajectory) else None
     group = camp_groups(structure) if played is None else family_groups(played.family)
     named: dict[int, str] = {}
     step: Any = "post" if style.get("drawstyle") == "steps-post" else None
-    few, ranges = len(group) <= NAMED_AGENTS, False
+    few, ranges, many = len(group) <= NAMED_AGENTS, False, len(group) > LINE_AGENTS
+    own = None if many else colours
     for name, (colour, line) in CAMP_STYLES.items():
-        members, label = np.flatnonzero(group == name), name
-        ends = members
-        if not few and members.size > NAMED_OF_PART:
+        members, label = np.flatnonzero(group == name), name if own is None else ""
+        if own is not None and 0 < members.size < len(group):
+            ax.plot([], [], color=BEHIND, linestyle=line, label=name)
+        elif own is not None:
+            line = "-"  # there is nothing to tell apart
+        ends = named_of_part(members, values, size=size)
+        if len(ends) < members.size:
             rows = np.nan_to_num(values[members])
-            ends = members[sorted({int(rows[:, 0].argmax())} | (set() if size else {int(rows[:, 0].argmin())}))]
-            if len(group) > LINE_AGENTS:
+            if many and members.size > LINES_OF_PART:
                 high, low = rows.max(axis=0), 0 if size else rows.min(axis=0)
                 ax.fill_between(run.t, low, high, color=colour, alpha=0.2, linewidth=0, step=step)
                 middle = high if size else rows.mean(axis=0)
                 ax.plot(run.t, middle, color=colour, linestyle=line, linewidth=2, label=name, **style)
                 members, label, ranges = ends, "", True
         width = (0.9 if name == "followers" else 1.5) if few else 0.6
-        for v in members:
+        for v in members.tolist():
             thick = width if few or v not in ends else 1.1
-            ax.plot(run.t, values[v], label=label or None, color=colour, linestyle=line, linewidth=thick, **style)
+            shade = colour if own is None else own[v]
+            ax.plot(run.t, values[v], label=label or None, color=shade, linestyle=line, linewidth=thick, **style)
             label = ""
-        named |= {int(v): colour for v in ends}
+        named |= {int(v): colour if own is None else own[v] for v in ends}
     if ranges:
         ax.fill_between([], [], color=BEHIND, alpha=0.3, label="largest" if size else "mean and range")
     return named
 
 
-def draw_deadlines(ax: Axes, run: Trajectory | AgentsTrajectory) -> None:
-    """Draw the deadline, and where sliding variables move that of theirs, as vertical lines."""
+def named_of_part(members: np.ndarray, values: np.ndarray, *, size: bool = False) -> np.ndarray:
+    """Return the agents that are named among the members of a part of a graph, by a quantity of all agents, (N, M).
+
+    Of up to eight agents it is each; of more, in a part of more than three, the agent whose quantity is the largest at
+    first, and, unless it is a ``size``, that with the least.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.camp_lines import named_of_part
+    >>> named_of_part(np.arange(5), np.array([[3], [7], [1], [2], [4], *[[0]] * 5]))
+    array([1, 2])
+    """
+    if len(values) <= NAMED_AGENTS or members.size <= NAMED_OF_PART:
+        return members
+    first = np.nan_to_num(values[members, 0])
+    return members[sorted({int(first.argmax())} | (set() if size else {int(first.argmin())}))]
+
+
+def draw_deadlines(ax: Axes, run: Trajectory | AgentsTrajectory, *, told: bool = False) -> None:
+    """Draw the deadline, and where sliding variables move that of theirs, as vertical lines.
+
+    They are named in the legend; or ``told`` beside the tops of their lines.
+    """
+    lines: list[tuple[Any, Any, str, str]] = []
     if isinstance(run, AgentsTrajectory) or run.protocol.prescribed:
-        ax.axvline(float(run.protocol.gain.T), color="black", linewidth=0.8, linestyle=":", label="deadline $T$")
+        lines.append((run.protocol.gain.T, ":", "$T$", "deadline $T$"))
     sliding = run.sliding if isinstance(run, Trajectory) else None
     if sliding is not None and sliding.sigma0.any():
-        reached = float(sliding.protocol.T_r)
-        ax.axvline(reached, color="black", linewidth=0.8, linestyle=(0, (5, 2, 1, 2)), label="$T_r$")
+        lines.append((sliding.protocol.T_r, (0, (5, 2, 1, 2)), "$T_r$", "$T_r$"))
+    beside: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "ha": "right"}
+    beside |= {"va": "top", "fontsize": NAME_SIZE, "path_effects": HALO}
+    for at, dashes, name, label in lines:
+        ax.axvline(float(at), color="black", linewidth=0.8, linestyle=dashes, label=None if told else label)
+        if told:
+            ax.annotate(f"{name} = {near(at)}", (float(at), 1), (-3, -2), **beside)
 
 
 def name_agents(
@@ -171,35 +207,50 @@ def name_agents(
 ) -> None:
     """Write the names of agents where their lines begin, and where they end if they end apart; show time ``until``.
 
-    If values are ``told``, (N,), they stand beside the names at the ends. Names take so much room only that the
-    time up to ``T`` keeps more than half of the width: longer ones have two lines, or stand at the beginning alone.
-    Where nothing changes after ``T``, little of that is shown unless told.
+    If values are ``told``, (N,), they stand beside the names at the ends, with those of all others who end there; a
+    point marks at ``T`` where a line has not arrived. Names take so much room only that the time up to ``T`` keeps half
+    of the width: longer ones have two lines, or stand at the beginning alone. Where nothing changes after ``T``, little
+    of that is shown unless told.
 
     ``lines`` holds the colours of the lines by agent, as :func:`draw_agents` returns them.
     """
     if not lines or not run.t.size:
         return
-    first, last = float(run.t[0]), _seen_until(run, values) if until is None else until
-    agents, colours = np.array(list(lines)), list(lines.values())
-    names = [shorten_text(printable(run.labels[v]), NAME_LENGTH) for v in agents]
-    at_end = values[agents, np.searchsorted(run.t, last * (1 + 1e-12), side="right") - 1]
-    digits = 2 - math.floor(math.log10(float(np.abs(np.nan_to_num(values)).max()) or 1.0))  # a run's 1e-9 is 0
-    tails = [""] * len(names) if told is None else [f": {round(float(told[v]), digits) + 0.0:.3g}" for v in agents]
+    first, last, T = float(run.t[0]), _seen_until(run, values) if until is None else until, _deadline(run)
+    agents, colours = list(lines), list(lines.values())
+    enders, enders_colours, tails, early = agents, colours, [""] * len(agents), np.zeros(len(values), dtype=bool)
+    at_end = values[:, np.searchsorted(run.t, last * (1 + 1e-12), side="right") - 1]
+    if told is not None:
+        digits = 2 - math.floor(math.log10(float(np.abs(np.nan_to_num(values)).max()) or 1.0))  # a run's 1e-9 is 0
+        tail_of = [f": {round(float(value), digits) + 0.0:.3g}" for value in told]
+        colour_of = {tail_of[v]: lines[v] for v in reversed(agents)}
+        enders = [*agents, *(v for v, tail in enumerate(tail_of) if v not in lines and tail in colour_of)]
+        tails = [tail_of[v] for v in enders]
+        enders_colours = [colour_of[tail] for tail in tails]
+        before = values[:, max(int(np.searchsorted(run.t, T)) - 1, 0)]
+        early = np.abs(before - told) > ARRIVED * abs(np.subtract(*ax.get_ylim()))
+        at_end = np.where(early, told, at_end)
+        for v in np.flatnonzero(early).tolist():
+            point: dict[str, Any] = {"marker": "o", "markersize": 3, "markevery": [0], "linewidth": 0.4, "zorder": 4}
+            ax.plot([T, last], [told[v]] * 2, color=lines.get(v, BEHIND), gid=f"end-{v}", **point)
+
+    def names_of(some: Sequence[int]) -> list[str]:
+        return [shorten_text(printable(run.labels[v]), NAME_LENGTH) for v in some]
 
     def columns_of(letters: Sequence[int]) -> list[list[tuple[float, float, str, str]]]:
-        texts = [_spread(ax, values[agents, 0], names, colours, letters[0])]
+        texts = [_spread(ax, values[agents, 0], names_of(agents), colours, letters[0])]
         if len(letters) > 1:
-            texts.append(_spread(ax, at_end, names, colours, letters[1], tails))
+            texts.append(_spread(ax, at_end[enders], names_of(enders), enders_colours, letters[1], tails))
         apart = len({height for height, *_ in texts[-1]}) > 1
         return texts if told is not None or apart else texts[:1]  # not where all end at the same place
 
-    wide, room, inside = _rooms(ax, (last - first) / ((min(last, _deadline(run)) - first) or 1))
+    wide, room, inside = _rooms(ax, (last - first) / ((min(last, T) - first) or 1))
     texts = columns_of([NAME_LENGTH + 8] * (1 + ends))
     needs = [max(text_width(name) for _, _, name, _ in column) for column in texts]
     if (free := (room - NAME_GAP * len(needs)) / WIDER) < sum(needs):
         right = [min(needs[1], max(free / 2, free - needs[0]))] if len(needs) > 1 else []
         letters = [max(3, int(part / text_width("x"))) for part in (free - sum(right), *right)]
-        longest = max(map(columns, names))
+        longest = max(map(columns, names_of(agents)))
         if len(letters) > 1 and told is None and min(letters) < max(longest / 2, min(longest, SHORT)):
             letters = [max(3, int((room - NAME_GAP) / WIDER / text_width("x")))]
         texts = columns_of(letters)
@@ -224,6 +275,19 @@ def name_agents(
     ax.set_xticks([x for x in ticks if first <= x <= last])
     ax.set_xlim(first - left, last)
     ax.spines["bottom"].set_bounds(first, last)  # names have their room before time begins
+
+
+def share_times(named: Sequence[Axes], every: Sequence[Axes], rows: int) -> None:
+    """Give all panels, in so many rows, the same times, with room for names at the left; the last row tells them."""
+    longest = max(named, key=lambda ax: ax.get_xlim()[1])
+    last, ticks = longest.get_xlim()[1], longest.get_xticks()
+    names = max(-ax.get_xlim()[0] / np.ptp(ax.get_xlim()) for ax in named)
+    for ax in every:
+        ax.set_xticks(ticks)
+        ax.set_xlim(-last * names / (1 - names), last)
+        ax.spines["bottom"].set_bounds(0, last)
+        spec = ax.get_subplotspec()
+        ax.tick_params(labelbottom=spec is None or spec.rowspan.stop == rows)
 
 
 def _deadline(run: Trajectory | AgentsTrajectory) -> float:
@@ -267,10 +331,11 @@ def _spread(
 ) -> list[tuple[float, float, str, str]]:
     """Return heights of lines, heights of their names, which do not overlap, names with their tails, and colours.
 
-    Lines that cannot be told apart there share one name, and one tail. Names have so many ``letters`` in a line.
+    Lines that cannot be told apart there share one name, of one colour; those with tails, all that have the same one.
+    Names have so many ``letters`` in a line.
     """
+    alike = tails if any(tails) else colours
     tails = tails or [""] * len(names)
-    alike = list(zip(colours, tails, strict=True))
     scale, limits = ax.yaxis.get_transform(), ax.get_ylim()
     low, high = scale.transform(np.array(limits))
     height = 0.75 * ax.get_window_extent().height / ax.figure.dpi * 72  # in points, when labels have their room
@@ -280,7 +345,7 @@ def _spread(
     for k in np.argsort(at, kind="stable"):
         if groups and at[k] - at[groups[-1][0]] < gap / 6:
             at[k] = at[groups[-1][0]]
-        same = [own for own in groups if at[k] == at[own[0]] and alike[k] == alike[own[0]]]
+        same = [own for own in groups if alike[k] == alike[own[0]] and (tails[k] or at[k] == at[own[0]])]
         if same:
             same[0].append(int(k))
         else:
@@ -297,12 +362,13 @@ def _spread(
 
 def _written(names: Sequence[str], tail: str, letters: int) -> str:
     """Join names with their tail, in a line or two of so many letters, and count those for which there is no room."""
+    wide = min(letters, NAME_LENGTH)
     for shown in range(len(names), 0, -1):
         text = ", ".join([*names[:shown], *([f"+{len(names) - shown}"] if shown < len(names) else [])])
         if columns(text) <= NAME_LENGTH and columns(text + tail) <= letters:
             return text + tail
-        head, rest = _halves(text, letters)
-        if columns(text) <= NAME_LENGTH and columns(rest + tail) <= letters:
+        head, rest = _halves(text, wide)
+        if columns(rest) <= wide and columns(rest + tail) <= letters:
             break
     else:
         if len(names) > 1:

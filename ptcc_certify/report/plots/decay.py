@@ -34,6 +34,8 @@ _BELOW_FLOOR = 1e-2
 _LAST, _INSTANTS = 1e-8, 401
 #: What is told where there is nothing to draw.
 NONE = "nothing decays: every agent begins where it ends, or nearer to it than a run tells; draw its states"
+#: What is said of curves of the plain protocol beside a run of what was asked, which the title names.
+_WITHOUT = "without these"
 #: The name of the best bound among those of the Lyapunov functions.
 _BEST = "best"
 
@@ -60,7 +62,7 @@ def plot_decay(
     ``||eps(t)||`` instead. Through a reaching phase the bounds are integrated in floating point: numerical. The run,
     with circles, is drawn down to the integrator's floor, its tolerance times the size of the states times what ``E``
     multiplies them by: below, a run says nothing. Where limits of the gain, late messages or moving leaders were asked,
-    that run is drawn besides; the bounds, and the run with circles, are without these.
+    that run is drawn; thin and grey behind it the best bound, and the run with circles, of the protocol without these.
 
     Of the certificate of a family ``max_k |x_k(t) - x_k(T)|`` under many signals is drawn below its bound for every
     signal, of those runs that have settled at ``T``, or of which it is proved where they end. Where no bound is drawn
@@ -113,7 +115,7 @@ def plot_decay(
         _require_bounds(proved, run)
     remaining = np.geomspace(1, _LAST, _INSTANTS) if run is None else run.remaining[run.remaining > 0]
     norm, floor, unit = error_norm(subject if run is None else run, proved)
-    bounds = {} if proved is None else _bounds(proved, remaining, unit, each)
+    bounds = {} if proved is None else _bounds(proved, remaining, unit, each, behind=asked is not None)
     best = bounds.get(_BEST, (np.full(remaining.size, np.inf), {}))[0]
     bounded = bool(bounds) and bool((best > _BELOW_FLOOR * floor).any())
     seen = np.full(norm.size, np.nan) if run is None else resolved(norm, best, floor)
@@ -128,7 +130,7 @@ def plot_decay(
     top = float(max(scale, best[np.isfinite(best)].max(initial=0.0)))
     if run is not None and norm.any():
         bottom = max(_BELOW_FLOOR * floor, min(float(norm.min()), bottom) / 3)
-        _draw_run(ax, place, seen / scale, floor / scale, bottom / scale, "" if asked is None else ideal_text(subject))
+        _draw_run(ax, place, seen / scale, floor / scale, bottom / scale, behind=asked is not None)
         last = int(np.flatnonzero(((best if bounds else norm) >= bottom) | (seen > best))[-1])
         top = max(top, float(np.nan_to_num(seen).max()))  # a violated bound stays in sight
     if asked is not None:
@@ -143,7 +145,10 @@ def plot_decay(
         (at,) = _places(p.gain, None, np.array([float(p.span / p.T)]))[axis]
         ax.axvline(at, color="black", linewidth=0.8, linestyle=(0, (5, 2, 1, 2)), label="$T_r$")
     name = r"\varepsilon" if proved is not None and proved.graph_proof.envelope.coordinates == "eps" else "E"
-    title = "" if run is None else limits_text(run if asked is None else asked, proved)
+    if run is None:
+        title = f"without what was asked: {without}" if (without := ideal_text(subject)) else ""
+    else:
+        title = limits_text(run if asked is None else asked, proved)
     return finished(ax, axis_label(axis, time_unit), rf"$\|{name}(t)\| \,/\, \|{name}(0)\|$", title)
 
 
@@ -250,36 +255,40 @@ def _places(gain: Gain, run: Trajectory | None, remaining: np.ndarray) -> dict[s
 
 
 def _bounds(
-    certificate: Certificate, remaining: np.ndarray, unit: float, each: bool
+    certificate: Certificate, remaining: np.ndarray, unit: float, each: bool, *, behind: bool
 ) -> dict[str, tuple[np.ndarray, dict[str, Any]]]:
-    """Return the bounds of every Lyapunov function in the norm, and the best of all, with how they are drawn."""
+    """Return the bounds of every Lyapunov function in the norm, and the best of all, with how they are drawn.
+
+    Behind a run that they do not bound the best stands alone.
+    """
     envelope, x0 = certificate.graph_proof.envelope, certificate.initial_state
     functions = [m for m in envelope.functions if m.coordinates == envelope.coordinates]
     bounds: dict[str, tuple[np.ndarray, dict[str, Any]]] = {}
     label: str | None = "each Lyapunov function"
-    without = f",\n{text}" if (text := ideal_text(certificate)) else ""
-    for function in functions if each and len(functions) > 1 else ():
+    for function in functions if each and not behind and len(functions) > 1 else ():
         values = replace(envelope, functions=(function,)).norm_bound(remaining, x0) / unit
         if function.kind == "paper":
             style: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": "--", "zorder": 2.1}
-            style["label"] = f"bound of {certificate.graph_proof.theorems_named}{without}"
+            style["label"] = f"bound of {certificate.graph_proof.theorems_named}"
         else:
             style = {"color": BOUND, "linewidth": 0.6, "alpha": 0.6, "linestyle": "-.", "label": label}
             label = None
         bounds[function.name] = values, style
     best = envelope.norm_bound(remaining, x0) / unit
+    if behind:
+        return {_BEST: (best, {"color": BEHIND, "linewidth": 0.8, "label": f"proved {_WITHOUT}"})}
     label = "proved bound from $x(0)$" if certificate.direct else "bound from $x(0)$ (numerical)"
-    return bounds | {_BEST: (best, {"color": BOUND, "linewidth": 1.8, "label": label + without})}
+    return bounds | {_BEST: (best, {"color": BOUND, "linewidth": 1.8, "label": label})}
 
 
-def _draw_run(ax: Axes, place: np.ndarray, seen: np.ndarray, floor: float, bottom: float, without: str) -> None:
+def _draw_run(ax: Axes, place: np.ndarray, seen: np.ndarray, floor: float, bottom: float, *, behind: bool) -> None:
     """Draw what a run says, and the floor below which it says nothing, if that is in sight.
 
-    Where it is not the run that was asked for it is pale, and named by what it is without.
+    Where it is not the run that was asked for it stands ``behind`` that.
     """
     if np.isfinite(seen).any():
         marks: dict[str, Any] = {"marker": "o", "markersize": 2.8, "markerfacecolor": "white", "markevery": 0.1}
-        colour, label = (BEHIND, f"simulated, {without}") if without else (RUN, "simulated (CVODES)")
+        colour, label = (BEHIND, f"simulated {_WITHOUT}") if behind else (RUN, "simulated (CVODES)")
         ax.plot(place, seen, color=colour, linewidth=1.1, label=label, **marks)
     if bottom < floor:
         _draw_floor(ax, floor, bottom)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Sequence
 from contextlib import suppress
@@ -10,28 +11,35 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from matplotlib import style
 from matplotlib.axes import Axes
-from matplotlib.colors import LinearSegmentedColormap, Normalize, to_hex
 from matplotlib.figure import Figure, SubFigure
 
-from lmi.exact.decimal_rounding import near
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.fact import Fact
 from ptcc_certify.certificate.tube import tube_of
 from ptcc_certify.errors import ParameterError, SimulationError, spell
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, LABELLED_NODES, REPEATED_NODES
+from ptcc_certify.report.facts.claim import assumptions
 from ptcc_certify.report.facts.of_certificate import facts_of
-from ptcc_certify.report.plots.camp_lines import draw_agents, name_agents
+from ptcc_certify.report.plots.camp_lines import (
+    LINE_AGENTS,
+    camp_groups,
+    draw_agents,
+    draw_deadlines,
+    name_agents,
+    named_of_part,
+)
 from ptcc_certify.report.plots.decay import NothingDecays
 from ptcc_certify.report.plots.distributions import plot_final_states
+from ptcc_certify.report.plots.final_colours import at_deadline, colours_at_end, final_states, positions_of
 from ptcc_certify.report.plots.graph import node_id, plot_graph
 from ptcc_certify.report.plots.graph_labels import INSIDE
 from ptcc_certify.report.plots.motion import agents_run, plot_formation
 from ptcc_certify.report.plots.sizes import DOUBLE_COLUMN, SINGLE_COLUMN, current_sizes
-from ptcc_certify.report.plots.style import BOUND, STYLE, finished, legend_columns, new_axes, shown, time_label
+from ptcc_certify.report.plots.style import BEHIND, BOUND, STYLE, finished, legend_columns, new_axes, shown, time_label
 from ptcc_certify.report.plots.subject import read_back, trajectory_of
 from ptcc_certify.report.plots.tracking import plot_tracking
 from ptcc_certify.report.plots.trajectory import plot_trajectory
-from ptcc_certify.report.text_layout import columns
+from ptcc_certify.report.text_layout import NO_BREAK, columns
 from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.family_behaviour import DEPENDS
 
@@ -43,10 +51,8 @@ _LEAST_HIGH = 2.0
 _NARROW, _STACKED, _MORE = 5.0, (2.7, 2.5), 0.11
 #: Inches from line to line of the title, and of the words below it.
 _TITLE, _LINE = 0.17, 0.14
-#: Colours of final states, from the least over 0 to the largest: all are legible on white, and white on them.
-ENDS = LinearSegmentedColormap.from_list("ends", ["#A84300", "#6A6A6A", "#005A9C"])
 #: What is told above the panels: the claim as the title, and of each row of heads the first fact that there is.
-_TOLD = (("late", "tracking", "error"), ("input",), ("disturbed",))
+_TOLD = (("late", "tracking", "limited", "error"), ("input",), ("disturbed",))
 #: Colours of a verdict: whether everything asked was proved.
 _GOOD, _DOUBT = "#117733", "#8A5A00"
 #: Characters of an inch of text; of the title, which is larger.
@@ -55,10 +61,12 @@ _CHARACTERS, _OF_TITLE = 16.5, 12.5
 _LEAST = 1e-9
 #: Up to when runs are shown, in units of ``T``.
 _LAST = 1.04
+#: How long steps of a bound are, in units of ``T``, whose corners are not joined.
+_FLAT = 0.1
 #: How dark tubes of all agents are together.
 _SHADE = 0.7
-#: Agents of which every one has a line; runs of more are drawn as ranges. Ends that are named.
-_LINES, _NAMED = LABELLED_NODES, 12
+#: Agents of which every one is named; of more those that begin highest and lowest. Up to how many lines are thick.
+_EACH, _THICK = LABELLED_NODES, 12
 
 
 def plot_glance(
@@ -77,9 +85,9 @@ def plot_glance(
     be, through a reaching phase of the sliding mode by bounds in floats (numerical), with its state at ``T`` at the end
     of its line: the proved final state, or under limits, with late messages or moving leaders that of the run.
 
-    Above 40 agents the graph is drawn as its matrix, and runs as ranges; above 1,000 no run is made for this. Of
-    families the runs are under many signals, of vehicles in the plane their ways are drawn. Where no initial state is
-    asked for it is what is left of the error from every one, or the graph alone.
+    Above 40 agents the graph is drawn as its matrix and few are named, above 60 runs are drawn as ranges; above 1,000
+    no run is made for this. Of families the runs are under many signals, of vehicles in the plane their ways are drawn.
+    Where no initial state is asked for it is what is left of the error from every one, or the graph alone.
 
     Parameters
     ----------
@@ -120,7 +128,7 @@ def plot_glance(
         run = _run_of(certificate, runs)
         beside = run is not None or (certificate.initial_state is not None and _of_bounds(certificate))
         alone = not beside and not _bounded_for_all(certificate)
-        rows = _STACKED[0], _STACKED[1] + _MORE * max(0, min(len(certificate.labels), _LINES) - 8)
+        rows = _STACKED[0], _STACKED[1] + _MORE * max(0, min(len(certificate.labels), _EACH) - 8)
         width = SINGLE_COLUMN[0] if stacked else sizes.of(DOUBLE_COLUMN)[0]
         head = _Head.of(certificate, width) if words else None
         above = 0.0 if head is None else head.high
@@ -132,15 +140,15 @@ def plot_glance(
         if head is not None:
             _, panels = figure.subfigures(2, 1, height_ratios=(above, high))  # type: ignore[misc]
             head.write(figure)
-        ends = _ends(certificate, run)
+        ends, colours = final_states(certificate, run), colours_at_end(certificate, run)
         if alone:
-            _draw_graph(panels.subfigures(1, 1), certificate, ends)
+            _draw_graph(panels.subfigures(1, 1), certificate, ends, colours)
             return shown(figure)
         if stacked:
             left, right = panels.subfigures(2, 1, height_ratios=rows)
         else:
             left, right = panels.subfigures(1, 2, width_ratios=(1, _RATIO))
-        _draw_graph(left, certificate, ends)
+        _draw_graph(left, certificate, ends, colours)
         if beside:
             _draw_runs(right, certificate, run, ends, runs, time_unit)
         else:
@@ -169,54 +177,9 @@ def _run_of(certificate: Certificate, runs: Sequence[Any] | None) -> Any:
         raise ParameterError("a state is beyond the range of float64; nothing is drawn of it") from None
 
 
-def _ends(certificate: Certificate, run: Any) -> np.ndarray:
-    """Return the state of every agent at ``T``, (N,): of an interval its middle, NaN where none is known.
-
-    It is the proved final state, or under a gain cap, with late messages or moving leaders that of the run.
-    """
-    proof, part = certificate.proof, certificate.proof.agents
-    if part is None and run is None and (proof.leaders_move or proof.late is not None):
-        return np.full(len(certificate.labels), np.nan)
-    if part is None and run is not None and (proof.limits or proof.late is not None or proof.leaders_move):
-        return at_deadline(run, run.positions)
-    known: list[Any] = []
-    if part is not None:  # of agents of order n that of positions; in several dimensions there is no one number
-        if run is not None and part.dimension == 1 and part.protocol.gain_cap is not None:
-            return at_deadline(run, run.states[:, 0, 0])
-        known = [agent[0][0][0] for agent in part.final_state or ()] if part.dimension == 1 else []
-    elif certificate.of_family:
-        ends_of_family = certificate.family_proof.final_positions
-        known = [None if end is None else sum(end) / 2 for end in ends_of_family or ()]
-    elif certificate.graph_proof.final_positions is not None:
-        known = list(certificate.graph_proof.final_positions.states)
-    try:
-        ends = [np.nan if end is None else float(end) for end in known]
-    except OverflowError:
-        raise ParameterError("a final state is beyond the range of float64; nothing is drawn of it") from None
-    return np.array(ends or [np.nan] * len(certificate.labels))
-
-
 def _of_bounds(certificate: Certificate) -> bool:
     """Tell whether runs under many signals are drawn, or bounds alone."""
     return certificate.of_family or certificate.proof.late is not None
-
-
-def at_deadline(run: Any, values: np.ndarray) -> np.ndarray:
-    """Return what values of a run, (N, M), are at ``T``, (N,)."""
-    return np.array([np.interp(float(run.protocol.gain.T), run.t, own) for own in values])
-
-
-def colours_of(ends: np.ndarray, largest: float | None = None) -> list[str]:
-    """Return the colours of states up to a largest one, by default theirs; grey of those that are not known.
-
-    Examples
-    --------
-    >>> from ptcc_certify.report.plots.glance import colours_of
-    >>> colours_of(np.array([2.0, 0.0, -2.0]))
-    ['#005a9c', '#6a6a6a', '#a84300']
-    """
-    largest = largest or float(np.nanmax(np.abs(ends), initial=0)) or 1.0
-    return [to_hex(colour) for colour in ENDS(Normalize(-largest, largest)(np.nan_to_num(ends)))]
 
 
 class _Head(NamedTuple):
@@ -235,8 +198,9 @@ class _Head(NamedTuple):
         (verdict,) = [spell(fact.note) for fact in facts if fact.head == "verdict"]
         fine = verdict.partition(";")[0] == "certified" and certificate.assessment.useful is not False
         notes = [] if fine else [f"verdict: {verdict}"]
+        asked, told = _asked(certificate, facts)
         for heads in _TOLD:
-            group = next(filter(None, ([f for f in facts if f.head == head] for head in heads)), [])
+            group = next(filter(None, ([f for f in facts if f.head == head and f is not told] for head in heads)), [])
             first = sorted(group, key=lambda fact: fact.side == "down")[:2]  # what is proved above
             notes += [f"{fact.head}: {spell(fact.note)}" for fact in first]
         word = certificate.assessment.word
@@ -244,9 +208,16 @@ class _Head(NamedTuple):
             word = f"asked: {word}"  # the claim itself is proved
         beside = width > _NARROW  # the verdict stands beside the title, or below it
         room = int(_OF_TITLE * (width - (0.3 + len(word) / _OF_TITLE if beside else 0)))
-        claims = [_fitting(fact, room) for fact in facts if fact.head == "claim"]
-        title = textwrap.wrap(_set("; ".join(claims)), room, max_lines=4, placeholder=" ...")
-        lines = [line for note in notes for line in textwrap.wrap(_set(note), int(_CHARACTERS * width))]
+        claimed = [fact for fact in facts if fact.head == "claim"]
+        claims = [_fitting(fact, room) for fact in claimed]
+        if asked:  # the claim is of less than what was asked, and what is drawn
+            ideal = assumptions(certificate)
+            texts = [text.replace("".join(f", {one}" for one in ideal), "") for text in claims]
+            notes.insert(not fine, f"{', '.join(ideal)}: {'; '.join(t for t in texts if t != ', '.join(ideal))}")
+        title = _wrapped(asked or "; ".join(claims), room, max_lines=4, placeholder=" ...")
+        if asked or len(claimed) == 1:  # else labels stand first
+            title[0] = title[0][:1].upper() + title[0][1:]
+        lines = [line for note in notes for line in _wrapped(note, int(_CHARACTERS * width))]
         return cls(title, lines, word, fine and not claims[0].startswith(DEPENDS), beside)
 
     @property
@@ -260,7 +231,6 @@ class _Head(NamedTuple):
         top = high - 0.06
         plain: dict[str, Any] = {"va": "top", "parse_math": False}
         for number, text in enumerate(self.title):
-            text = text[:1].upper() + text[1:] if not number else text
             figure.text(0.012, (top - number * _TITLE) / high, text, fontsize=10, weight="bold", **plain)
         begin = top - _TITLE * len(self.title)
         x, y = (0.988, top) if self.beside else (0.012, begin)
@@ -277,18 +247,68 @@ def _fitting(fact: Fact, characters: int) -> str:
     return next((text for text in texts if len(text) <= characters), texts[-1])
 
 
-def _set(text: str) -> str:
-    """Return a text with the signs of print."""
-    return text.replace("<=", "\N{LESS-THAN OR EQUAL TO}").replace("||", "\N{DOUBLE VERTICAL LINE}")
+def _asked(certificate: Certificate, facts: Sequence[Fact]) -> tuple[str, Fact | None]:
+    """Say what is proved of late messages, moving leaders and limits of the gain, and by which fact; of others nothing.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.glance import _asked
+    >>> asks = {"messages": LateMessages(delay="0.01", gain_cap=20), "asks": Asks(simulation=False)}
+    >>> cert = certify([("a", "b", 1)], NominalProtocol(T=1, rho1=1, rho2=2, kappa=1), [1, 2], **asks)
+    >>> _asked(cert, cert.facts())[0]
+    'late messages under a gain cap: every agent within 0.000552 of its final state at T'
+    """
+    late, leaders = certificate.proof.late, certificate.proof.asked_leaders
+    if late is None and leaders is None:
+        if not certificate.limits or certificate.proof.agents is not None:
+            return "", None
+        proved = [f for f in facts if f.head == "error" and not spell(f.note).startswith("without")]
+        if not proved:
+            return "under limits of the gain: nothing is proved", None
+        return spell(proved[0].brief[0] if proved[0].brief else proved[0].note), proved[0]
+    messages = None if late is None else late.messages
+    parts = {
+        "moving leaders": leaders is not None and leaders.speed > 0,
+        "disturbances": leaders is not None and leaders.disturbance > 0,
+    }
+    given = [name for name, there in parts.items() if there]
+    if messages is not None and not messages.exact:
+        given.insert(0, messages.name)
+    if messages is not None and messages.vehicles is not None:
+        given = [" of ".join([*given[:1], "vehicles"]), *given[1:]]
+    capped = certificate.limits or (messages is not None and messages.gain_cap is not None)
+    under = " ".join(filter(None, (", ".join(given), "under a gain cap" if capped else "")))
+    every = [f for f in facts if f.head in ("late", "tracking", "limited") and "every " in spell(f.note)]
+    if not every:
+        return f"{under}: nothing is proved", None
+    text = spell(every[0].note)
+    return f"{under}: {text[text.index('every ') :].partition(';')[0]}", every[0]
 
 
-def _draw_graph(panel: SubFigure, certificate: Certificate, ends: np.ndarray) -> None:
+#: Blanks at which no line breaks: before a sign of percent, about equality, around numbers of theorems or T.
+_TIED = re.compile(r" (?=%)| (?=[=\u2264] )|(?<=[=\u2264]) |(?<=Theorem) |(?<=Corollary) |(?<=\d) (?=T\b)")
+
+
+def _wrapped(text: str, characters: int, **limits: Any) -> list[str]:
+    """Return the lines of a text with the signs of print, in which no number is parted from what it is of.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.glance import _wrapped
+    >>> _wrapped("consensus at T = 1 (Theorem 2.1): 5 % is left", 16)
+    ['consensus at', 'T = 1', '(Theorem 2.1):', '5 % is left']
+    """
+    text = text.replace("<=", "\N{LESS-THAN OR EQUAL TO}").replace("||", "\N{DOUBLE VERTICAL LINE}")
+    return [line.replace(NO_BREAK, " ") for line in textwrap.wrap(_TIED.sub(NO_BREAK, text), characters, **limits)]
+
+
+def _draw_graph(panel: SubFigure, certificate: Certificate, ends: np.ndarray, colours: list[str] | None) -> None:
     """Draw who listens to whom, in the colours of final states; of a graph too large for that its final states."""
     subject = certificate.family_proof.family if certificate.of_family else certificate.graph_proof.structure
     if ends.size <= LABELLED_NODES:
         beside = max(map(columns, certificate.labels)) > INSIDE  # labels reach beyond the nodes
         ax = panel.add_axes((0.11, 0.16, 0.78, 0.82) if beside else (0.02, 0.16, 0.96, 0.82))
-        plot_graph(subject, ax=ax, colours=None if certificate.of_family or np.isnan(ends).all() else colours_of(ends))
+        plot_graph(subject, ax=ax, colours=colours)
         if (legend := ax.get_legend()) is not None:
             texts = [text.get_text() for text in legend.get_texts()]
             handles: Any = legend.legend_handles
@@ -342,13 +362,38 @@ def _draw_error(ax: Axes, certificate: Certificate, time_unit: str) -> None:
     finished(ax, time_label("time $t$", time_unit), rf"$\|{z}(t)\| \,/\, \|{z}(0)\|$")
 
 
+def joined_above(t: np.ndarray, bound: np.ndarray, longest: float) -> np.ndarray:
+    """Return what lies on a bound, (M,), or above it, and joins the corners of its steps that are not the longest.
+
+    Between instants, too, it is not below a bound that falls, or rises, from the one to the other.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.glance import joined_above
+    >>> joined_above(np.arange(8.0), np.array([4, 4, 4, 2, 2, 2, 2, 0.0]), 5)
+    array([4. , 4. , 4. , 4. , 3.5, 3. , 2.5, 2. ])
+    """
+    known = np.flatnonzero(np.isfinite(bound))
+    if known.size < 2:
+        return bound
+    wide, times = bound[known], t[known]
+    wide = np.maximum.reduce([wide, np.append(wide[:1], wide[:-1]), np.append(wide[1:], wide[-1:])])
+    change = np.flatnonzero(np.diff(wide))
+    falls, begins = wide[change + 1] < wide[change], np.append(0, change + 1)
+    ends = np.append(change, wide.size - 1)
+    flat = times[ends] - times[begins] > longest
+    kept = np.unique([0, wide.size - 1, *change[falls], *(change[~falls] + 1), *begins[flat], *ends[flat]])
+    return np.concatenate([bound[: known[0]], np.interp(times, times[kept], wide[kept]), bound[known[-1] + 1 :]])
+
+
 def _draw_run(ax: Axes, certificate: Certificate, run: Any, ends: np.ndarray, time_unit: str) -> None:
     """Draw the run of every agent of one graph within its tube, with its state at ``T`` at the end of its line."""
-    values = run.positions if isinstance(run, Trajectory) else run.states[:, 0, 0]
-    T, colours = float(run.protocol.gain.T), colours_of(ends)
+    values, T = positions_of(run), float(run.protocol.gain.T)
+    colours = colours_at_end(certificate, run) or [BEHIND] * len(values)
     ends = np.where(np.isnan(ends), at_deadline(run, values), ends)
-    if len(values) > _LINES:
-        named = draw_agents(ax, run, values, certificate.graph_proof.structure)
+    structure = certificate.graph_proof.structure
+    if len(values) > LINE_AGENTS:
+        named = draw_agents(ax, run, values, structure)
     else:
         single = isinstance(run, Trajectory)
         tube = tube_of(certificate.graph_proof, run.t, run.targets) if single else None
@@ -357,22 +402,28 @@ def _draw_run(ax: Axes, certificate: Certificate, run: Any, ends: np.ndarray, ti
         ideal = single and not (proof.limits or proof.late is not None or proof.leaders_move)
         until = run.t < T if ideal and not run.deadline_resolved else run.t >= 0
         for k, colour in enumerate(colours):
-            width = 1.3 if len(values) <= _NAMED else 0.8
+            width = 1.3 if len(values) <= _THICK else 0.8
             ax.plot(run.t[until], values[k][until], color=colour, linewidth=width, gid=node_id(k, "run"))
             if tube is not None and np.isfinite(tube.low[k]).any():
                 shade: dict[str, Any] = {"alpha": _SHADE / max(5, len(values)), "linewidth": 0}
-                ax.fill_between(run.t[until], tube.low[k][until], tube.high[k][until], color=colour, **shade)
+                middle, half = (tube.high[k] + tube.low[k]) / 2, (tube.high[k] - tube.low[k]) / 2
+                half = joined_above(run.t, half, _FLAT * T)
+                ax.fill_between(run.t[until], (middle - half)[until], (middle + half)[until], color=colour, **shade)
         named = dict(enumerate(colours))
-        if tube is not None and not certificate.direct:
-            ax.set_title("shaded: bounds integrated in floats (numerical)", loc="left")
-    seen = values[:, run.t <= _LAST * T]
+        if len(values) > _EACH:
+            group = camp_groups(structure)
+            parts = [named_of_part(np.flatnonzero(group == part), values) for part in dict.fromkeys(group)]
+            named = {int(v): colours[v] for v in np.concatenate(parts)}
+        keys = ["colour: state at $T$"]
+        if tube is not None and np.isfinite(tube.low[:, run.t < T]).any():
+            keys.insert(0, "shaded: proved" if certificate.direct else "shaded: bounds in floats (numerical)")
+        ax.set_title("; ".join(keys), loc="left", fontsize=7)
+    seen = np.column_stack([values[:, run.t <= _LAST * T], ends])
     least, most = float(seen.min()), float(seen.max())
     room = 0.06 * (most - least) or 1.0
     ax.set_ylim(least - room, most + room)
-    ax.axvline(T, color="black", linewidth=0.8, linestyle=":")
     name_agents(ax, run, values, named, ends=True, until=_LAST * T, told=ends)
-    deadline: dict[str, Any] = {"textcoords": "offset points", "ha": "right", "va": "top", "fontsize": 7}
-    ax.annotate(f"$T$ = {near(run.protocol.gain.T)}", (T, most + room), (-3, -2), **deadline)
+    draw_deadlines(ax, run, told=True)
     part = certificate.proof.agents
     name = "state $x_k$" if part is None and certificate.proof.velocities is None else "position"
     finished(ax, time_label("time $t$", time_unit), f"{name}, coordinate 1" if part and part.dimension > 1 else name)

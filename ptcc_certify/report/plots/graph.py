@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,6 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrowPatch, Polygon
 
 from lmi.exact.decimal_rounding import counted
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.errors import SimulationError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.io.conversion import as_family, is_family
@@ -18,6 +21,7 @@ from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.report.plots.adjacency import draw_adjacency
 from ptcc_certify.report.plots.camp_lines import CAMP_STYLES, camp_groups, family_camps, family_groups
+from ptcc_certify.report.plots.final_colours import colours_at_end
 from ptcc_certify.report.plots.graph_labels import INSIDE, boxes_along, draw_labels, draw_sizes
 from ptcc_certify.report.plots.graph_layout import FREE_NODES, Arrow, places_and_bends, triangles_of
 from ptcc_certify.report.plots.sizes import SINGLE_COLUMN, current_sizes
@@ -71,8 +75,8 @@ def plot_graph(subject: Any, *, ax: Axes | None = None, colours: Sequence[Any] |
 
     Solid arrows come from allies (``w_kj > 0``), dashed ones from opponents; two opposite ones of the same weight are
     one with two heads. Where weights differ, ``|w_kj|`` is written at up to 24 arrows, and told by widths. Nodes have
-    the colours of their camps; leaders are outlined, and a grey ground lies under each group of several, the closed
-    strong components. The layout is the same in every run.
+    the colours of their camps, of a certificate those of states at ``T``, as at a glance; leaders are outlined, and a
+    grey ground lies under each group of several, the closed strong components. The layout is the same in every run.
 
     Graphs of more than 40 nodes are drawn as their matrix ``W``: row ``k`` holds whom ``k`` listens to, camps and
     followers stand together.
@@ -108,12 +112,15 @@ def plot_graph(subject: Any, *, ax: Axes | None = None, colours: Sequence[Any] |
     """
     if is_of_family(subject) or is_family(subject):
         return _draw_family(as_family(getattr(subject, "family", subject)), ax, colours)
-    structure = structure_of(subject)
+    structure, told = structure_of(subject), ""
     graph = structure.graph
     own_axes = ax is None
     ax = axes_of(ax, (SINGLE_COLUMN[0], _HEIGHT))
     if graph.n_nodes > LABELLED_NODES:
         return draw_adjacency(ax, structure)
+    if isinstance(subject, Certificate) and colours is None:
+        colours = _colours_of(subject)
+        told = "" if colours is None else "colour: state at $T$"
     room = np.array(ax.get_window_extent().size) / ax.figure.dpi * 72 * [1.05, 0.95]  # points, of own axes
     component_of = np.full(graph.n_nodes, -1)
     for number, component in enumerate(structure.closed_components):
@@ -126,10 +133,20 @@ def plot_graph(subject: Any, *, ax: Axes | None = None, colours: Sequence[Any] |
     if groups and colours is None:
         ax.fill([], [], color=GROUND, label="leader group")
     boxes = _draw_mode(ax, structure, camp_groups(structure), edges, bends, layout, colours=colours)
-    finished(ax, "", "")
+    finished(ax, "", "", told)
     if own_axes:
         fit_height(ax, boxes, layout.radius)
     return ax
+
+
+def _colours_of(certificate: Certificate) -> list[str] | None:
+    """Return the colours of nodes by where their agents end: where that is not proved of what was asked, in its run."""
+    proof = certificate.proof
+    run = None
+    if proof.limits or proof.late is not None or proof.leaders_move:
+        with suppress(SimulationError):
+            run = certificate.asked_trajectory
+    return colours_at_end(certificate, run)
 
 
 def _draw_family(family: Family, ax: Axes | None, colours: Sequence[Any] | None) -> Axes:
@@ -290,7 +307,7 @@ def _draw_coloured(
         marker, size = _SHAPES.get(groups[k], ("o", 1.0))
         edge = outline if k in leads else {"markeredgewidth": 0}
         ax.plot(*p, marker, markersize=2 * radius * size, color=colour, zorder=3, gid=node_id(k), **edge)
-    if 0 < len(leads) < len(groups):
+    if leads:
         ax.plot([], [], "o", color="white", markersize=6, label="leads", **outline)
     for name, (marker, _) in _SHAPES.items():
         if (groups == name).any():

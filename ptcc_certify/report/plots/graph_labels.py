@@ -21,6 +21,8 @@ WEIGHED_ARROWS = 24
 WEIGHT_SHARES = np.array([0.5, 0.45, 0.55, 0.4, 0.6, 0.35, 0.65, 0.3, 0.7, 0.25, 0.75])
 #: Boxes along an arrow of three points each; its own weight keeps off so many at either end.
 BOX, NEAR_ENDS = 3, 5
+#: How far beside a short arrow its weight may stand too, as multiples of the nearest place.
+FURTHER = (0.75, -0.75, 1.5, -1.5, 2, -2)
 #: Points between two weights.
 APART = 6
 
@@ -78,7 +80,7 @@ def draw_sizes(
         along = place[arrow.target] - place[arrow.source]
         length = max(float(np.linalg.norm(along)), 1e-9)
         beside = along[::-1] * [1, -1] / length * (np.linalg.norm(half) + 1)
-        spots += [spots[0] + beside, spots[0] - beside]
+        spots += [spots[at] + far * beside for far in (1, -1, *FURTHER) for at in (0, 1, 2, 5, 6)]
         others = [*lines[:k], lines[k][:NEAR_ENDS], lines[k][-NEAR_ENDS:], *lines[k + 1 :]]
         box = least_covered(spots, half, [*taken, *(box for line in others for box in line)])
         taken.append(box + APART * np.array([-1, -1, 1, 1]))

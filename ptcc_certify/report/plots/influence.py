@@ -18,8 +18,10 @@ from ptcc_certify.report.text_layout import printable, shorten_text
 
 #: Colours of weights, from the least over 0 to the largest.
 _COLOURS = LinearSegmentedColormap.from_list("weights", ["#A84300", "#FFFFFF", "#005A9C"])
-#: Columns of a name; height of a row in inches, and the least and largest height of a figure.
-_NAME, _ROW, _HEIGHTS = 14, 0.17, (1.8, 7.0)
+#: The luminance on which black and white have the same contrast, which is 4.58.
+_MIDDLE = 0.179
+#: Columns of a name; height of a row in inches, and the least and largest height of a figure; rows that are named.
+_NAME, _ROW, _HEIGHTS, _ROWS = 14, 0.15, (1.8, 10.0), 60
 
 
 @styled
@@ -67,7 +69,7 @@ def plot_influence(subject: Any, *, ax: Axes | None = None) -> Axes:
         matrix[k] = [float(row.get(j, 0)) for j in leaders]
     decider = np.where(matrix.any(axis=1), np.abs(matrix).argmax(axis=1), len(leaders))  # who ends at 0 stands last
     order = np.lexsort((-matrix.sum(axis=1), decider))
-    height = float(np.clip(0.9 + _ROW * len(labels), *_HEIGHTS))
+    height = float(np.clip(0.9 + _ROW * len(labels), *_HEIGHTS)) if len(labels) <= _ROWS else 7.0
     ax = axes_of(ax, (SINGLE_COLUMN[0], height))
     edges = np.arange(len(leaders) + 1) - 0.5, np.arange(len(labels) + 1) - 0.5
     most = float(np.abs(matrix).max())
@@ -77,7 +79,7 @@ def plot_influence(subject: Any, *, ax: Axes | None = None) -> Axes:
     ax.invert_yaxis()
     ax.grid(False)
     ax.spines[:].set_visible(False)
-    named = len(labels) <= LABELLED_NODES
+    named = len(labels) <= _ROWS
     ax.set_xticks(range(len(leaders)) if len(leaders) <= LABELLED_NODES else [], minor=False)
     ax.set_yticks(range(len(labels)) if named else [])
     if len(leaders) <= LABELLED_NODES:
@@ -87,16 +89,18 @@ def plot_influence(subject: Any, *, ax: Axes | None = None) -> Axes:
     if named:
         ax.set_yticklabels([labels[k] for k in order], parse_math=False, fontsize=NAME_SIZE)
         if matrix.size <= 12 * LABELLED_NODES and len(leaders) <= 8:
-            _write_weights(ax, matrix[order], most)
+            _write_weights(ax, matrix[order], cells.to_rgba(matrix[order]))
     ax.tick_params(length=0)
-    bar = ax.figure.colorbar(cells, ax=ax, shrink=0.7)
+    bar = ax.figure.colorbar(cells, ax=ax, shrink=0.7, label="weight in $x(T)$")
     bar.outline.set_visible(False)  # type: ignore[operator]
     return finished(ax, "whose initial state", "who ends there" if named else f"who ends there ({len(labels)} nodes)")
 
 
-def _write_weights(ax: Axes, matrix: np.ndarray, most: float) -> None:
-    """Write weights into their cells, white on dark ones."""
+def _write_weights(ax: Axes, matrix: np.ndarray, colours: np.ndarray) -> None:
+    """Write weights into their cells, black or white, whichever stands out; 0 where nobody counts."""
+    linear = np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)[..., :3]
+    dark = linear @ [0.2126, 0.7152, 0.0722] < _MIDDLE
     for (row, column), weight in np.ndenumerate(matrix):
-        if weight:
+        if weight or not matrix[row].any():
             text: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 6.5}
-            ax.text(column, row, f"{weight:.2g}", color="white" if abs(weight) > 0.55 * most else "black", **text)
+            ax.text(column, row, f"{weight:.2g}", color="white" if dark[row, column] else "black", **text)

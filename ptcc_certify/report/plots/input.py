@@ -41,9 +41,9 @@ RESOLVED_ERROR = 10
 LARGE_GROWTH, LARGE, BRIEF = 3, 1 / 5, 1 / 8
 #: from so many decades below its initial size on; with signs from so many, and linear about 0.
 INPUT_DECADES, SIGNED_DECADES = 3, 2
-#: A bound is drawn as a line up to so many times the largest input of the run, else named at the top; on a linear axis,
-#: and on a logarithmic one.
-HIGH_PEAK, HIGH_PEAK_OF_LOGARITHM = 1.6, 30
+#: Or if a bound is so many times above the largest input. On a logarithmic axis a bound is drawn as a line up to so
+#: many times the largest input of the run, else named at the top.
+HIGH_PEAK, HIGH_PEAK_OF_LOGARITHM = 3, 1e6
 
 
 class InputAxis(NamedTuple):
@@ -210,8 +210,9 @@ def _axis_of(t: np.ndarray, values: np.ndarray, peaks: Sequence[Peak], *, signed
     even = np.interp(np.linspace(t[0], t[-1], 401), t, np.abs(values).max(axis=0))
     brief = (even > LARGE * top).mean() < BRIEF
     least = 0.0
-    if first and (brief or top > LARGE_GROWTH * first):
-        least = first * 10.0 ** -(SIGNED_DECADES if signed else INPUT_DECADES)
+    far = any(peak.value > HIGH_PEAK * top for peak in peaks)
+    if top and (far or (first and (brief or top > LARGE_GROWTH * first))):
+        least = (first or top) * 10.0 ** -(SIGNED_DECADES if signed else INPUT_DECADES)
     shown = [peak.value for peak in peaks if _is_near(peak, top, least)]
     room = 2 if least else 1.12
     high, low = room * max([float(values.max(initial=0)), *shown]), float(values.min(initial=0))
@@ -273,11 +274,13 @@ def _every_period_sampled(run: Trajectory) -> bool:
 
 
 def _peaks(run: Trajectory, certificate: Certificate) -> list[Peak]:
-    """Return what bounds the input of a run, and with late messages."""
+    """Return what bounds the input of a run, be it with late messages; not those of another run than it."""
     late = certificate.proof.late
     peak = None if run.vehicles else _certified_peak(run, certificate)  # which is of the virtual positions then
     found = [] if peak is None else [Peak(peak, f"certified peak {up(peak, 4)}{_set_text(run, certificate)}")]
-    if late is not None and (largest := largest_late_input(late, certificate.protocol)) is not None:
+    met = run.conditions
+    acts = met.messages is not None or met.leaders is not None or met.actuator is not None or run.vehicles
+    if late is not None and acts and (largest := largest_late_input(late, certificate.protocol)) is not None:
         whole = f", from within 1 of the {'targets' if late.tracks else 'final states'}" if late.relative else ""
         what = "moving leaders" if late.tracks else "as asked" if late.messages.exact else "late messages"
         found.append(Peak(float(largest), f"{what}: at most {up(largest, 4)}{whole}", BOUND))

@@ -23,10 +23,11 @@ from ptcc_certify.report.plots.camp_lines import (
     draw_agents,
     draw_deadlines,
     name_agents,
+    share_times,
 )
 from ptcc_certify.report.plots.graph import node_id
 from ptcc_certify.report.plots.sizes import DOUBLE_COLUMN, SINGLE_COLUMN, current_sizes
-from ptcc_certify.report.plots.style import BEHIND, axes_of, finished, new_axes, shown, styled, time_label
+from ptcc_certify.report.plots.style import BEHIND, axes_of, finished, new_axes, share_legend, shown, styled, time_label
 from ptcc_certify.report.plots.subject import read_back
 from ptcc_certify.report.text_layout import printable, shorten_text
 from ptcc_certify.simulation.agents import AgentsTrajectory
@@ -60,7 +61,7 @@ def agents_run(subject: Any) -> AgentsTrajectory:
 
 
 def plot_motion(subject: Any, *, wide: bool = False, time_unit: str = "") -> Figure:
-    """Draw positions, velocities and so on over time, of each coordinate below each other.
+    """Draw positions, velocities and so on over time, below each other; in the plane x and y side by side.
 
     Of more than 60 agents, parts of the graph with more than three are drawn as their range and mean.
 
@@ -68,7 +69,7 @@ def plot_motion(subject: Any, *, wide: bool = False, time_unit: str = "") -> Fig
     ----------
     subject : AgentsTrajectory, or Certificate of agents of order n
     wide : bool
-        As wide as two columns of a journal, the coordinates side by side.
+        As wide as two columns of a journal, all coordinates side by side.
     time_unit : str
         Of the deadline, for the labels of the axes.
 
@@ -97,37 +98,27 @@ def plot_motion(subject: Any, *, wide: bool = False, time_unit: str = "") -> Fig
     _, d, n, _ = run.states.shape
     width, height = SINGLE_COLUMN
     with style.context(STYLE):
-        rows, columns = (n, d) if wide else (n * d, 1)
-        size = (DOUBLE_COLUMN[0] if wide else width), 0.75 * height * rows
-        figure = Figure(current_sizes().of(size), layout="constrained")
+        beside, sizes = wide or d == 2, current_sizes()
+        rows, columns = (n, d) if beside else (n * d, 1)
+        broad = wide or (beside and sizes.widths[1] > sizes.widths[0])
+        size = (DOUBLE_COLUMN[0] if broad else width), 0.75 * height * rows
+        figure = Figure(sizes.of(size), layout="constrained")
         structure = analyse(run.graph)
         for i in range(n):
             for q in range(d):
-                place = i * d + q if wide else q * n + i
+                place = i * d + q if beside else q * n + i
                 ax = new_axes(figure, (rows, columns, 1 + place))
                 lines = draw_agents(ax, run, run.states[:, q, i], structure)
                 draw_deadlines(ax, run)
                 name = _NAMES[i] if i < len(_NAMES) else f"derivative {i}"
-                label = f"{name} {q + 1}" if d > 1 else name
+                label = f"{name} {'xyz'[q] if d < 4 else q + 1}" if d > 1 else name
                 finished(ax, time_label("time $t$", time_unit) if place // columns == rows - 1 else "", label)
                 if not i:
                     name_agents(ax, run, run.states[:, q, i], lines)
                 elif run.graph.n_nodes <= NAMED_AGENTS:
                     _name_peaks(ax, run, run.states[:, q, i], lines)
-                if (legend := ax.get_legend()) is not None and (i or q):
-                    legend.remove()
-        _align(figure.axes[:d], figure.axes)  # positions are drawn first
-        return shown(figure)
-
-
-def _align(named: list[Axes], every: list[Axes]) -> None:
-    """Give all panels the times of the one whose names take most room."""
-    widest = min(named, key=lambda ax: ax.get_xlim()[0])
-    limits, ticks = widest.get_xlim(), widest.get_xticks()
-    for ax in every:
-        ax.set_xticks(ticks)
-        ax.set_xlim(limits)
-        ax.spines["bottom"].set_bounds(0, limits[1])
+        share_times(figure.axes[:d], figure.axes, rows)  # positions are drawn first
+        return shown(share_legend(figure, 3))
 
 
 def _name_peaks(ax: Axes, run: AgentsTrajectory, values: np.ndarray, colours: dict[int, str]) -> None:

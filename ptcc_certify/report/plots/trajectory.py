@@ -22,7 +22,9 @@ from ptcc_certify.report.plots.camp_lines import (
     family_camps,
     family_groups,
     name_agents,
+    share_times,
 )
+from ptcc_certify.report.plots.final_colours import colours_at_end
 from ptcc_certify.report.plots.runs_under_signals import bound_label, count_of_signals, is_worst, runs_of
 from ptcc_certify.report.plots.sizes import DOUBLE_COLUMN, SINGLE_COLUMN, current_sizes
 from ptcc_certify.report.plots.style import BEHIND, BOUND, axes_of, finished, new_axes, share_legend, styled, time_label
@@ -37,9 +39,10 @@ BAR: dict[str, Any] = {"linewidth": 2.5, "marker": "_", "markersize": 5}
 def plot_trajectory(
     subject: Any, *, ax: Axes | None = None, runs: Sequence[Trajectory] | None = None, time_unit: str = ""
 ) -> Axes:
-    """Draw the states ``x_k(t)`` of one run, in the colours and lines of the camps, and the deadline ``T``.
+    """Draw the states ``x_k(t)`` of one run, and the deadline ``T``.
 
-    In a formation these are positions, the places added.
+    Lines are those of the camps; colours of up to 60 agents of a certificate those of states at ``T``, as at a glance,
+    else of the camps, too. In a formation these are positions, the places added.
     Of up to eight agents each line has its name, of more those of the agents that begin highest and lowest in each part
     of the graph. Of more than 60 agents these parts are drawn as their range and mean.
 
@@ -74,7 +77,7 @@ def plot_trajectory(
     >>> run = simulate(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
     >>> ax = plot_trajectory(run, time_unit="s")
     >>> ax.get_xlabel(), [text.get_text() for text in ax.texts]
-    ('time $t$ (s)', ['ann', 'bob', 'ann', 'bob'])
+    ('time $t$ (s)', ['$T$ = 1', 'ann', 'bob', 'ann', 'bob'])
     """
     every, ax = runs_of(subject, runs), axes_of(ax)
     run, values = every[0], every[0].positions
@@ -82,14 +85,19 @@ def plot_trajectory(
         named, limits = _draw_signals(ax, subject, every)
         title = count_of_signals(subject, every)
     else:
-        named, limits = draw_agents(ax, run, values, structure_of(subject)), None
+        named, limits = draw_agents(ax, run, values, structure_of(subject), colours=_colours(subject, run)), None
         title = limits_text(run, subject if isinstance(subject, Certificate) else None)
-    draw_deadlines(ax, run)
+    draw_deadlines(ax, run, told=True)
     until = None if limits is None else float(run.t[-1])  # beyond T stand bars of final states
     name_agents(ax, run, values, named, ends=limits is None, until=until)
     if limits is not None:
         ax.set_ylim(limits)
     return finished(ax, time_label("time $t$", time_unit), "state $x_k$", title)
+
+
+def _colours(subject: Any, run: Trajectory) -> list[str] | None:
+    """Return the colours of agents by where they end, if a certificate tells that."""
+    return colours_at_end(subject, run) if isinstance(subject, Certificate) else None
 
 
 def _draw_signals(
@@ -171,7 +179,7 @@ def _draw_tubes(
 def plot_run(
     subject: Any, *, reaching: Sequence[ReachingTime] | None = None, wide: bool = False, time_unit: str = ""
 ) -> Figure:
-    """Draw the states ``x_k(t)``; in a reaching phase the sliding variables ``sigma_k(t)`` below them.
+    """Draw the states ``x_k(t)``; in a reaching phase the sliding variables ``sigma_k(t)`` below, at the same times.
 
     Parameters
     ----------
@@ -197,6 +205,9 @@ def plot_run(
     """
     width, height = DOUBLE_COLUMN if wide else SINGLE_COLUMN
     sizes, run = current_sizes(), trajectory_of(subject)
+    reaching = subject.proof.reaching if reaching is None and isinstance(subject, Certificate) else reaching
+    if isinstance(subject, Certificate) and subject.trajectory is None and run.sliding is not None:
+        subject = subject.changed(trajectory=run)  # which both panels show
     if run.sliding is None or not run.sliding.sigma0.any():
         figure = Figure(sizes.of((width, height)), layout="constrained")
         plot_trajectory(subject, ax=new_axes(figure), time_unit=time_unit)
@@ -204,9 +215,10 @@ def plot_run(
     figure = Figure(sizes.of((width, 1.8 * height)), layout="constrained")
     upper = new_axes(figure, (2, 1, 1))
     lower = new_axes(figure, (2, 1, 2))
-    plot_trajectory(run, ax=upper, time_unit=time_unit)
-    reaching = subject.proof.reaching if reaching is None and isinstance(subject, Certificate) else reaching
-    plot_sliding(run, ax=lower, reaching=reaching, time_unit=time_unit)
+    plot_trajectory(subject, ax=upper, time_unit=time_unit)
+    plot_sliding(subject, ax=lower, reaching=reaching, time_unit=time_unit)
+    upper.set_xlabel("")
+    share_times([upper, lower], [upper, lower], 2)
     return share_legend(figure, 3 if wide else 2)
 
 
@@ -252,7 +264,7 @@ def plot_sliding(
         raise ParameterError("the run has no sliding variables; simulate under the sliding-mode protocol")
     reaching = subject.proof.reaching if reaching is None and isinstance(subject, Certificate) else reaching
     T_r = float(sliding.protocol.T_r)
-    named = draw_agents(ax, run, sliding.sigma, structure)
+    named = draw_agents(ax, run, sliding.sigma, structure, colours=_colours(subject, run))
     reached = sliding.reaching_times[sliding.sigma0 != 0]
     if np.isfinite(reached).any():
         marked: dict[str, Any] = {"color": "black", "markerfacecolor": "white", "markersize": 3.5, "zorder": 4}
