@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from bad_inputs import ptcc as command
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
+from matplotlib.text import Text
 from PIL import Image
 
 import ptcc_certify as ptcc
@@ -131,6 +133,17 @@ def test_of_many_agents_labels_count_all_who_end_there(n: int, lines: int) -> No
         counted = len(shown.strip(", ").split(", ")) + int(more) if shown else int(more)
         assert counted == sum(abs(x - value) < 0.01 for x in final), names
     assert len(ends_told(ax)) == 2
+
+
+def test_names_at_the_left_stay_beside_the_axis_and_few_names_need_no_higher_panel() -> None:
+    figure = plot_glance(certificate("fig5a"))
+    FigureCanvasAgg(figure).draw()
+    ax = figure.axes[1]
+    box = ax.get_window_extent()
+    for text in ax.texts:
+        extent = Text.get_window_extent(text)
+        assert box.y0 - 3 < extent.y0 and extent.y1 < box.y1 + 3, text.get_text()
+    assert plot_glance(made(45, 20), stacked=True).get_figheight() < 7
 
 
 def test_up_to_60_agents_are_coloured_by_where_they_end() -> None:

@@ -351,7 +351,8 @@ def _spread(
         else:
             groups.append([int(k)])
     texts = [_written([names[k] for k in sorted(own)], tails[own[0]], letters) for own in groups]
-    sizes = gap * np.array([1 + text.count("\n") for text in texts])
+    rows = np.array([1 + text.count("\n") for text in texts])
+    sizes = min(gap, (high - low) / rows.sum()) * rows
     place = np.array([at[own[0]] for own in groups])
     steps = np.concatenate([[0], np.cumsum((sizes[1:] + sizes[:-1]) / 2)])
     least = low + sizes[0] / 2

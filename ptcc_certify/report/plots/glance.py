@@ -56,7 +56,7 @@ _TOLD = (("late", "tracking", "limited", "error"), ("input",), ("disturbed",))
 #: Colours of a verdict: whether everything asked was proved.
 _GOOD, _DOUBT = "#117733", "#8A5A00"
 #: Characters of an inch of text; of the title, which is larger.
-_CHARACTERS, _OF_TITLE = 16.5, 12.5
+_CHARACTERS, _OF_TITLE = 16.5, 11.8
 #: The least share of the error that is drawn.
 _LEAST = 1e-9
 #: Up to when runs are shown, in units of ``T``.
@@ -128,7 +128,8 @@ def plot_glance(
         run = _run_of(certificate, runs)
         beside = run is not None or (certificate.initial_state is not None and _of_bounds(certificate))
         alone = not beside and not _bounded_for_all(certificate)
-        rows = _STACKED[0], _STACKED[1] + _MORE * max(0, min(len(certificate.labels), _EACH) - 8)
+        n = len(certificate.labels)
+        rows = _STACKED[0], _STACKED[1] + _MORE * (max(0, n - 8) if n <= _EACH else 0)
         width = SINGLE_COLUMN[0] if stacked else sizes.of(DOUBLE_COLUMN)[0]
         head = _Head.of(certificate, width) if words else None
         above = 0.0 if head is None else head.high
@@ -196,8 +197,8 @@ class _Head(NamedTuple):
         """Return what is told of a certificate, in lines for so many inches."""
         facts = [fact for fact in facts_of(certificate, details=False) if not fact.detail]
         (verdict,) = [spell(fact.note) for fact in facts if fact.head == "verdict"]
-        fine = verdict.partition(";")[0] == "certified" and certificate.assessment.useful is not False
-        notes = [] if fine else [f"verdict: {verdict}"]
+        fine = not certificate.assessment.exit_code and certificate.assessment.useful is not False
+        notes = [] if fine and verdict.partition(";")[0] == "certified" else [f"verdict: {verdict}"]
         asked, told = _asked(certificate, facts)
         for heads in _TOLD:
             group = next(filter(None, ([f for f in facts if f.head == head and f is not told] for head in heads)), [])
@@ -286,7 +287,9 @@ def _asked(certificate: Certificate, facts: Sequence[Fact]) -> tuple[str, Fact |
 
 
 #: Blanks at which no line breaks: before a sign of percent, about equality, around numbers of theorems or T.
-_TIED = re.compile(r" (?=%)| (?=[=\u2264] )|(?<=[=\u2264]) |(?<=Theorem) |(?<=Corollary) |(?<=\d) (?=T\b)")
+_TIED = re.compile(
+    r" (?=%)| (?=[=\u2264] )|(?<=[=\u2264]) |(?<=Theorem) |(?<=Corollary) |(?<=within) |(?:(?<=\d)|(?<=at)) (?=T\b)"
+)
 
 
 def _wrapped(text: str, characters: int, **limits: Any) -> list[str]:
@@ -296,7 +299,7 @@ def _wrapped(text: str, characters: int, **limits: Any) -> list[str]:
     --------
     >>> from ptcc_certify.report.plots.glance import _wrapped
     >>> _wrapped("consensus at T = 1 (Theorem 2.1): 5 % is left", 16)
-    ['consensus at', 'T = 1', '(Theorem 2.1):', '5 % is left']
+    ['consensus', 'at T = 1', '(Theorem 2.1):', '5 % is left']
     """
     text = text.replace("<=", "\N{LESS-THAN OR EQUAL TO}").replace("||", "\N{DOUBLE VERTICAL LINE}")
     return [line.replace(NO_BREAK, " ") for line in textwrap.wrap(_TIED.sub(NO_BREAK, text), characters, **limits)]
