@@ -37,7 +37,7 @@ NAME_SIZE, NAME_LENGTH, TICK_ROOM = 7, 18, 24
 SHORT, WIDER = 6, 1.1
 #: The least share of the width of a panel for the time up to ``T``; points beside it for the axis and its label, and
 #: between a line and its name.
-TIME_SHARE, AXIS_ROOM, NAME_GAP = 0.5, 40, 10
+TIME_SHARE, AXIS_ROOM, NAME_GAP = 0.55, 40, 10
 #: How far beyond ``T`` a figure goes, and how far if nothing changes by more than such a share there.
 LATEST, AFTER, CALM = 1.2, 1.1, 0.01
 #: How far a line may be from a value that is told of ``T``, as a share of the axis, and lead to it.
