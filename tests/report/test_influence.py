@@ -14,7 +14,7 @@ from generators import made_graphs
 from hypothesis import given
 
 import ptcc_certify as ptcc
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import ParameterError, unlabelled
 from ptcc_certify.report.facts.influence import influence_facts
 from ptcc_certify.report.plots.influence import plot_influence
 
@@ -72,3 +72,15 @@ def test_the_command_prints_writes_and_draws(tmp_path: Path):
     assert told["weights"]["6"] == {"1": "-1/8", "2": "-3/16", "3": "3/16"} and told["exact"]
     refused = command("influence", "fig3a", "-o", str(tmp_path / "q.txt"))
     assert refused.code == 2 and refused.err.count("\n") == 1 and not (tmp_path / "q.txt").exists()
+
+
+def test_long_sums_and_long_names_keep_whole_terms_on_the_short_screen():
+    names = [f"Bürgermeisterin Nummer {k} der Stadt" for k in range(6)]
+    ring = [(names[k], names[(k + step) % 6], k + step) for k in range(6) for step in (1, 2)]
+    _, ends = influence_facts(ptcc.influence([*ring, (names[0], "zoe", -1)]))
+    (brief,) = (unlabelled(text) for text in ends.brief)
+    group, _, rest = brief.partition(" end at ")
+    first, _, more = rest.partition(" + ")
+    assert group == "Bürgerm...er 0 der Stadt, ... (6 in all)" and first.split(" x_")[1].endswith("Stadt")
+    assert "+ ... (6 terms)" in more and brief.endswith(", ... (2 in all)")
+    assert len(brief) <= 140
