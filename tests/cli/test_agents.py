@@ -161,6 +161,13 @@ def test_a_scenario_tells_the_agents(tmp_path: Path):
         (("--agents", "2", "--a0", "1,2,3,4,5,6"), "--a0: agents of order 2 have no acceleration"),
         (("--agents", "2", "--initial-bound", "3"), "--initial-bound: is not proved of agents of order n"),
         (("--agents", "9"), "or an order from 1 to 8"),
+        *(
+            (("--agents", "2", "--dimension", "2", "--delay", "0.01", *more), "--dimension: " + what)
+            for more, what in (
+                ((), "late messages and leaders that move take one coordinate at a time"),
+                (("--exchange", "virtual"), "vehicles that exchange virtual positions take one coordinate at a time"),
+            )
+        ),
     ],
 )
 def test_what_does_not_fit_agents_is_refused_in_one_line(options: tuple[str, ...], says: str):
