@@ -192,7 +192,7 @@ def _may_exchange(options: Options) -> bool:
     """Tell whether agents are double integrators that could exchange virtual positions, of which more is proved."""
     plain = all(options[name] is None for name in _OWN if name not in ("v0", "offsets"))
     plain = plain and not options.get("own_delay") and options.get("kind") == "nominal"
-    return options["agents"] == "double-integrator" and plain
+    return options["agents"] in ("double-integrator", "2") and plain
 
 
 def _refuse_unproved(options: Options, certified: bool) -> None:
