@@ -29,7 +29,7 @@ from ptcc_certify.bounds.envelope import Envelope
 from ptcc_certify.checker import check, read
 from ptcc_certify.examples import EXAMPLES, GRAPHS, load_graph, select
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.io import write_graph
+from ptcc_certify.graphs.io import read_graph, write_graph
 from ptcc_certify.graphs.structure import BEHAVIOURS, analyse
 from ptcc_certify.report.screen import check_summary
 
@@ -717,6 +717,17 @@ def test_the_screen_of_certify_fits_24_lines(name: str):
         expected = {"graph", "read", "structure", "claim", "protocol", "x(0)", "x(T)", "rate", "error", "proof"}
         assert expected | {"simulated", "verdict"} <= heads
         assert "Theorem" in run.out
+
+
+def test_camps_of_followers_are_told_where_the_whole_graph_is_balanced(tmp_path: Path):
+    file = tmp_path / "led.csv"
+    file.write_text("a,b,-1\nb,a,-1\nb,c,1\nc,d,-2\n")
+    assert "camps      of all {a, d} against {b, c}" in ptcc("classify", str(file)).out
+    camp = analyse(read_graph(file)).to_pandas()["camp"]
+    assert camp.to_dict() == {"a": 1, "b": -1, "c": -1, "d": 1}
+    file.write_text("a,b,-1\nb,a,-1\nb,c,1\na,c,1\n")
+    assert "of all" not in ptcc("classify", str(file), "-v").out
+    assert analyse(read_graph(file)).to_pandas()["camp"].isna().to_dict() == {"a": False, "b": False, "c": True}
 
 
 def test_the_screen_of_classify_names_camps_and_cycles():
