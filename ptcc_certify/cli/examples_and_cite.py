@@ -18,7 +18,13 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("name", default="all")
 @click.option("-o", "--output", type=click.Path(file_okay=False), help="Write certificates and figures to this folder.")
-@click.option("--format", "suffix", type=click.Choice(["png", "pdf", "svg"]), default="png", help="Of figures.")
+@click.option(
+    "--format",
+    "suffix",
+    type=click.Choice(["png", "pdf", "svg"], case_sensitive=False),
+    default="png",
+    help="Of figures.",
+)
 def examples(name: str, output: str | None, suffix: str) -> int:
     """Run the paper's examples (all, a number 1 to 6, or a graph such as fig1a) and print two lines each.
 

@@ -123,7 +123,11 @@ certificate_argument = click.argument("certificate", callback=_certificate, type
 def kind_option(text: str) -> declared.Decorator:
     """Return the option that tells the protocol; it comes before the others, which may be of one protocol alone."""
     told = replace(declared.KIND, help=text)
-    more: dict[str, Any] = {"type": click.Choice(list(told.choices)), "default": told.default, "help": told.help}
+    more: dict[str, Any] = {
+        "type": click.Choice(list(told.choices), case_sensitive=False),
+        "default": told.default,
+        "help": told.help,
+    }
     return click.option(told.flag, told.name, is_eager=True, callback=kind_of_protocol, **more)
 
 

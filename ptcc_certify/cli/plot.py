@@ -82,7 +82,7 @@ class _Figure(click.Choice):  # type: ignore[type-arg]  # no generic class befor
 @click.option(
     "--for",
     "purpose",
-    type=click.Choice(["ieee", "nature", "slide"]),
+    type=click.Choice(["ieee", "nature", "slide"], case_sensitive=False),
     default="ieee",
     help="Sizes of figure and text: columns of a journal of the IEEE, 3.5 or 7.16 inches, or of Nature, 89 or 183 mm; "
     "a slide of 16 to 9.",

@@ -655,8 +655,8 @@ class SignedDigraph(ReadOnly, Shown):
 
 #: What a matrix without an orientation is refused with.
 WAY = (
-    'does not tell its direction: say orientation="listens" if row k holds whom k listens to (the paper\'s W), or '
-    '"information" if row k holds whom k informs (networkx.to_numpy_array)'
+    'does not tell its direction: write as_graph(W, orientation="listens") if row k holds whom k listens to (the '
+    'paper\'s W), or "information" if row k holds whom k informs (networkx.to_numpy_array)'
 )
 _READ_DEFAULT: dict[str, Any] = {
     "orientation": "information",

@@ -257,8 +257,8 @@ class Structure(ReadOnly, Shown):
         """Return one row per node.
 
         Its ``role`` is leader or follower; ``group`` is the number of a leader's closed component, missing for
-        followers; ``component`` that of the weakly connected one. ``camp`` is +1 or -1 within the component if the whole
-        graph is balanced; else within a leader's group, 0 if that is unbalanced, and missing for followers.
+        followers; ``component`` that of the weakly connected one. ``camp`` is +1 or -1 within the component if the
+        whole graph is balanced; else within a leader's group, 0 if that is unbalanced, and missing for followers.
 
         Raises
         ------

@@ -352,3 +352,17 @@ def test_a_missing_file_names_first_what_begins_alike(tmp_path: Path, monkeypatc
     for name in ("crew_of_monday_morning.csv", "screw.csv", "other.csv"):
         Path(name).write_text("a,b,1\n")
     assert "did you mean crew_of_monday_morning.csv?" in ptcc("classify", "crew.csv").err
+
+
+def test_the_deadline_under_another_name_and_words_in_capitals():
+    for words, flag in ((("--deadline", "3"), "--deadline"), (("-T", "3"), "-T")):
+        assert ptcc("certify", "team.csv", *words).err == f"ptcc: No such option '{flag}'. Did you mean --T?\n"
+    loud, plain = (ptcc("classify", "team.csv", "--edges", word) for word in ("Listens", "listens"))
+    assert loud.code == 0 and loud.out == plain.out
+    assert ptcc("certify", "team.csv", "--protocol", "Nominal", "--method", "Paper").code == 0
+
+
+def test_what_is_no_number_is_told_how_one_looks():
+    for text, mend in (("fast", "give a number such as 0.5"), ("0,5", "write decimals with a point, 0.5")):
+        told = ptcc("certify", "team.csv", "--leader-speed", text)
+        assert told.code == 2 and told.err == f'ptcc: --leader-speed: "{text}" is not a number; {mend}\n'
