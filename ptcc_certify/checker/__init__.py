@@ -49,7 +49,7 @@ from ptcc_certify.checker.protocol import (
 from ptcc_certify.checker.reading import SCHEMA, RejectedError, UnreadableError, digest, exact, need, read
 from ptcc_certify.checker.row_functions import check_family_functions
 from ptcc_certify.checker.section_declarations import declared
-from ptcc_certify.checker.side_files import SideFiles
+from ptcc_certify.checker.side_files import SideFiles, beside
 from ptcc_certify.checker.signal_bounds import check_drive, check_family_bounds
 from ptcc_certify.checker.structure import MANY_COMPONENTS, StructureSection, check_claim, check_structure
 from ptcc_certify.checker.theorem_function import check_paper
@@ -265,13 +265,13 @@ def stated(data: Mapping[str, Any]) -> list[str]:
     elif isinstance(parts := data.get("components"), list):
         told = dict.fromkeys(part["claim"]["behaviour"] for part in parts)
         lines.append(f"claim      {', '.join(told)}, component by component ({len(parts)})")
-    ends = data.get("final_state", {})
+    ends = {} if beside(data.get("final_state")) else data.get("final_state", {})
     known = [f"{shorten(node)} {_end(ends[node])}" for node in nodes[:STATED] if ends.get(node)]
     if known:
         lines.append(f"x(T)       {', '.join(known)}{', ..' if len(nodes) > STATED else ''}")
-    beside = [key for key in ("agents", "messages", "formation", "restricted") if key in data]
-    beside += ["input.residual"] if data.get("input", {}).get("residual") else []
-    return [*lines, f"beside     {', '.join(beside)}: claim and x(T) are without these"] if beside else lines
+    without = [key for key in ("agents", "messages", "formation", "restricted") if key in data]
+    without += ["input.residual"] if data.get("input", {}).get("residual") else []
+    return [*lines, f"beside     {', '.join(without)}: claim and x(T) are without these"] if without else lines
 
 
 def _end(end: str | Mapping[str, str]) -> str:

@@ -119,6 +119,12 @@ def test_what_is_no_certificate_is_told(page: Any, tmp_path: Path) -> None:
         file = tmp_path / "c.json"
         file.write_text(text)
         assert answered(page, file)[0] == 2
+    file.write_text("a,b,1")
+    code, text = answered(page, file)
+    assert code == 2 and "this is no certificate" in text
+    file.write_bytes(b"\xef\xbb\xbf" + (CORPUS / "fig3a.json").read_bytes())
+    assert answered(page, file) == told(CORPUS / "fig3a.json")
+    assert "claim      interval bipartite consensus (Theorem 2.1)" in page.text_content("#answer > .stated")
 
 
 def test_integers_of_the_browser_are_what_they_should_be(tmp_path: Path) -> None:
