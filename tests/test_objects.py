@@ -4,6 +4,7 @@ import builtins
 import copy
 import json
 import pickle
+import re
 from fractions import Fraction
 from typing import Any
 
@@ -77,6 +78,12 @@ def test_a_copy_of_a_graph_can_no_more_be_written_to_than_the_graph(cert):
         for name in ("labels", "weights", "n_nodes"):
             with pytest.raises(AttributeError, match="make another graph"):
                 setattr(graph, name, ())
+
+
+def test_a_name_that_a_certificate_does_not_have_is_told_with_near_ones(cert):
+    for name, near in (("final_states", "; did you mean final_state"), ("settling_time", ""), ("_private", "")):
+        with pytest.raises(AttributeError, match=f"^a Certificate has no attribute {name}{re.escape(near)}"):
+            getattr(cert, name)
 
 
 def test_parts_of_a_certificate_have_a_hash(cert):

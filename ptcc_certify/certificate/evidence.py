@@ -19,7 +19,7 @@ from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.certificate.proof import OfQuestion
 from ptcc_certify.certificate.request import Question
-from ptcc_certify.errors import ParameterError, PTCCError, SimulationError, unknown_parameter
+from ptcc_certify.errors import ParameterError, PTCCError, SimulationError, did_you_mean, unknown_parameter
 from ptcc_certify.lazy_report import Shown
 from ptcc_certify.lyapunov.search import Search
 from ptcc_certify.model.disturbance import ExpressionDisturbance
@@ -95,7 +95,13 @@ class Evidence(OfQuestion, Shown):
             if name.startswith("__") or name in ("proof", "observed"):
                 raise AttributeError(name)
             part = self.observed if hasattr(type(self.observed), name) else self.proof
-            return getattr(part, name)
+            try:
+                return getattr(part, name)
+            except AttributeError:
+                if name in dir(part):  # which it has, and misses something itself
+                    raise
+                known = [] if name[0] == "_" else sorted({*dir(self), *dir(part)})
+                raise AttributeError(f"a Certificate has no attribute {name}{did_you_mean(name, known)}") from None
 
     @property
     def final_state(self) -> FinalState | FinalEnds | None:

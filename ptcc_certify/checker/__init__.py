@@ -22,6 +22,8 @@ from pathlib import Path
 from typing import Any
 
 from lmi.exact import arithmetic
+from lmi.exact.decimal_rounding import counted, down, up
+from lmi.exact.numbers import shorten
 from lmi.exact.work import Account, WorkError, limited
 from ptcc_certify.checker.agents import check_agents
 from ptcc_certify.checker.attracting_boxes import check_boxes
@@ -44,10 +46,10 @@ from ptcc_certify.checker.protocol import (
     check_protocol,
     check_sliding,
 )
-from ptcc_certify.checker.reading import SCHEMA, RejectedError, UnreadableError, digest, need, read
+from ptcc_certify.checker.reading import SCHEMA, RejectedError, UnreadableError, digest, exact, need, read
 from ptcc_certify.checker.row_functions import check_family_functions
 from ptcc_certify.checker.section_declarations import declared
-from ptcc_certify.checker.side_files import SideFiles
+from ptcc_certify.checker.side_files import SideFiles, beside
 from ptcc_certify.checker.signal_bounds import check_drive, check_family_bounds
 from ptcc_certify.checker.structure import MANY_COMPONENTS, StructureSection, check_claim, check_structure
 from ptcc_certify.checker.theorem_function import check_paper
@@ -55,6 +57,8 @@ from ptcc_certify.checker.theorem_function import check_paper
 USAGE = "usage: python -m ptcc_certify.checker CERTIFICATE|- [--stdlib] [--memory GB]"
 GRAPH = "a graph file is not read: compare the SHA-256 that is printed, or use ptcc check CERTIFICATE GRAPH"
 
+#: Final states that are told of an accepted certificate.
+STATED = 4
 #: What values of another type, or too deep, raise where they are used.
 MALFORMED = (ArithmeticError, LookupError, TypeError, ValueError, AttributeError, RecursionError, MemoryError)
 
@@ -237,6 +241,47 @@ def _family_verdict(doc: Document, protocol: Protocol) -> str:
     return doc.close(True)
 
 
+def stated(data: Mapping[str, Any]) -> list[str]:
+    """Tell in four lines at most what an accepted certificate is about: protocol, claim, the first final states.
+
+    Examples
+    --------
+    >>> cert = certify([("a", "b", -1)], NominalProtocol(T=2, rho1=1), [3, 1], asks=Asks(simulation=False))
+    >>> print(*stated(cert.to_dict()), sep=chr(10))
+    protocol   nominal: T=2, rho1=1, rho2=1, kappa=2; 2 nodes
+    claim      interval bipartite consensus (Theorem 2.1)
+    x(T)       a at 3, b at -3
+    """
+    problem = data["problem"]
+    nodes, gain = problem["graph"]["nodes"], dict(problem["gain"])
+    gain.pop("disturbance", None)
+    numbers = ", ".join(f"{key}={shorten(value)}" for key, value in gain.items() if key != "kind")
+    signal = f", signal {problem['signal']}" if "signal" in problem else ""
+    lines = [f"protocol   {gain['kind']}: {numbers}; {counted(len(nodes), 'node')}{signal}"]
+    if "claim" in data:
+        theorem = data["claim"]["theorem"]
+        named = f"Theorem {theorem}" if theorem[0].isdigit() else theorem
+        lines.append(f"claim      {data['claim']['behaviour']} ({named})")
+    elif isinstance(parts := data.get("components"), list):
+        told = dict.fromkeys(part["claim"]["behaviour"] for part in parts)
+        lines.append(f"claim      {', '.join(told)}, component by component ({len(parts)})")
+    ends = {} if beside(data.get("final_state")) else data.get("final_state", {})
+    known = [f"{shorten(node)} {_end(ends[node])}" for node in nodes[:STATED] if ends.get(node)]
+    if known:
+        lines.append(f"x(T)       {', '.join(known)}{', ..' if len(nodes) > STATED else ''}")
+    without = [key for key in ("agents", "messages", "formation", "restricted") if key in data]
+    without += ["input.residual"] if data.get("input", {}).get("residual") else []
+    return [*lines, f"beside     {', '.join(without)}: claim and x(T) are without these"] if without else lines
+
+
+def _end(end: str | Mapping[str, str]) -> str:
+    """Tell a final state as it is stated if that is short, else rounded outwards."""
+    if isinstance(end, str) and len(end) <= 12:
+        return f"at {end}"
+    mid, radius = (exact(end), 0) if isinstance(end, str) else (exact(end["mid"]), exact(end["radius"]))
+    return f"in [{down(mid - radius)}, {up(mid + radius)}]"
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Check the certificate that the command line names; 0 proved, 1 rejected, 2 unreadable, 4 undecided."""
     for stream in (sys.stdout, sys.stderr):  # labels may hold what the terminal cannot show
@@ -259,14 +304,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(USAGE, file=sys.stderr)
         return 2
     try:
-        report = check(paths[0], stdlib=stdlib, memory=memory)
+        data, report = read_and_check(paths[0], stdlib=stdlib, memory=memory)
     except UnreadableError as error:
         print(f"checker: {error}", file=sys.stderr)
         return 2
     *lines, last = report.lines()
     if report.sha256:
         lines.insert(0, f"graph      SHA-256 {report.sha256}; compare it with that of the graph you mean")
-    for line in lines:
+    for line in [*lines, *(stated(data) if report.accepted else ())]:
         print(textwrap.fill(line, 80, subsequent_indent=" " * 11, break_on_hyphens=False, break_long_words=False))
     print(last)  # a refusal is one line
     return 1 if not report.accepted else 0 if report.verdict == "certified" else 4

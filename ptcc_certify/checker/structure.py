@@ -234,7 +234,8 @@ def check_claim(doc: Document, structure: Structure, sliding: bool) -> Claim:
         ((_, kind, claim),) = expected
         need("components" not in doc, "components of a connected graph")
         need(connectivity == kind, f"the graph is {kind}")
-        need(section == claim, f"the claim is Theorem {claim.theorem}")
+        other = section is not None and section.theorem == claim.theorem and section.behaviour != claim.behaviour
+        need(section == claim, f"the claim is {f'{claim.behaviour} by ' if other else ''}Theorem {claim.theorem}")
         verified = Claim(claim.theorem, [])
     else:
         need(connectivity == "disconnected" and section is None, "the graph is disconnected")

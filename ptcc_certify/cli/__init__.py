@@ -45,6 +45,8 @@ _NO_ARGUMENTS = getattr(click.exceptions, "NoArgsIsHelpError", ())  # its messag
 _TOLD = {"why": "; the line why of classify and certify tells the counterexample of a family"}
 #: What design calls options of other commands.
 _OF_DESIGN = {"--T": "--deadline", "--x0": "--initial-bound", "--seed": "--initial-bound"}
+#: What the deadline is called elsewhere.
+_DEADLINE = ("--deadline", "-T")
 
 
 #: The commands, and what the help says of each, in this order.
@@ -106,6 +108,8 @@ class _Commands(click.Group):
                 raise click.UsageError(f"{unknown}. A file of this name is written ./{files[0]}") from None
             if ctx.invoked_subcommand == "design" and flag in _OF_DESIGN:
                 raise click.UsageError(f"{unknown}; here it is {_OF_DESIGN[flag]}") from None
+            if flag in _DEADLINE and any("--T" in p.opts for p in self.commands[ctx.invoked_subcommand or ""].params):
+                raise click.UsageError(f"{unknown}. Did you mean --T?") from None
             if not (having := [f"ptcc {name}" for name, c in others if any(flag in p.opts for p in c.params)]):
                 options = [p for p in error.possibilities or () if did_you_mean(flag.lstrip("-"), [p.lstrip("-")])]
                 hint = f" Did you mean {' or '.join(options)}?" if options else ""  # click's counts the dashes as alike

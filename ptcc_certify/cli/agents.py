@@ -103,7 +103,7 @@ def agents_and_states(
         return None, None
     d = options["dimension"] or 1
     if not (certified and d == 1 and (agents.of_paper or agents.virtual)):
-        _refuse_unproved(options, certified and d == 1)
+        _refuse_unproved(options, certified)
     agents = _in_places(agents, options, graph, d)
     given = [options["v0"], options["a0"]]
     later = [
@@ -192,22 +192,28 @@ def _may_exchange(options: Options) -> bool:
     """Tell whether agents are double integrators that could exchange virtual positions, of which more is proved."""
     plain = all(options[name] is None for name in _OWN if name not in ("v0", "offsets"))
     plain = plain and not options.get("own_delay") and options.get("kind") == "nominal"
-    return options["agents"] == "double-integrator" and plain
+    return options["agents"] in ("double-integrator", "2") and plain
 
 
 def _refuse_unproved(options: Options, certified: bool) -> None:
     """Refuse what is asked of single integrators alone, by the names of the options: those with one mend at once."""
-    if exchanges_virtual(options):
+    given = [name for name in _OF_SINGLE_INTEGRATORS if options.get(name) is not None]
+    several, virtual = (options["dimension"] or 1) > 1, exchanges_virtual(options)
+    late = bool(set(given) & _OF_VEHICLES) and (options["agents"] is None or _may_exchange(options))
+    if certified and several and (virtual or late):
+        what = "vehicles that exchange virtual positions" if virtual else "late messages and leaders that move"
+        mend = "leave it out, and certify each coordinate alone"
+        raise ParameterError(f"--dimension: {what} take one coordinate at a time, for none acts on another; {mend}")
+    if virtual:
         raise ParameterError(
             "--exchange: of vehicles that exchange virtual positions this is not built yet; "
             "ptcc certify -o c.json takes one coordinate at a time, ptcc plot c.json draws that; or leave it out"
         )
-    given = [name for name in _OF_SINGLE_INTEGRATORS if options.get(name) is not None]
     if given:
         mend = _OF_SINGLE_INTEGRATORS[given[0]]
         flags = [declared.flag_of(name) for name in given if _OF_SINGLE_INTEGRATORS[name] == mend]
         mend += f" {agents_flags(options)}" if mend == _MESSAGES else ""
-        if certified and set(given) <= _OF_VEHICLES and _may_exchange(options):
+        if certified and not several and set(given) <= _OF_VEHICLES and _may_exchange(options):
             mend = f"{_EXCHANGE} leave it out"
         verb, mend = ("is", mend) if len(flags) == 1 else ("are", mend.replace("leave it", "leave them"))
         whom = "in a formation" if options["agents"] is None else "of order n"

@@ -137,8 +137,12 @@ def report(certificate: str, output: str, simulation: bool | None, memory: float
     except RejectedCertificate as error:
         print_lines(f"rejected: {error}", err=True)
         return ExitCode.VIOLATED
+    if verdict == "rejected":
+        print_lines(f"rejected   {'standard input' if certificate == '-' else certificate}")
+        print_lines(f"written    {output} (tells why)")
+        return ExitCode.VIOLATED
     print_lines(f"{verdict:<10} {output}")
     if (path := Path(output)).suffix.lower() == ".tex":
         figures = re.findall(rf"{re.escape(path.stem)}_\w+\.pdf", path.read_text(encoding="utf-8"))
         print_lines(f"{'written':<10} {', '.join(dict.fromkeys([path.name, *figures]))}")
-    return {"undecided": ExitCode.UNDECIDED, "rejected": ExitCode.VIOLATED}.get(verdict, ExitCode.OK)
+    return ExitCode.UNDECIDED if verdict == "undecided" else ExitCode.OK

@@ -147,14 +147,14 @@ def flag_of(name: str) -> str:
 
 def exact_number(text: str, flag: str) -> Fraction:
     """Return the exact number that a text of an option stands for."""
-    from ptcc_certify.graphs.rationals import parse_exact
+    from ptcc_certify.graphs.rationals import decimal_mend, parse_exact
 
     try:
         return parse_exact(text)
     except PTCCError as error:
         times = {told.word for told in DECLARED if told.unit == "time"}
-        mend = "; give a number in your unit of time, such as 0.001" if flag in times else ""
-        raise ParameterError(f"{flag}: {error}{mend}") from None
+        such = "a number in your unit of time, such as 0.001" if flag in times else "a number such as 0.5"
+        raise ParameterError(f"{flag}: {error}; {decimal_mend(text, f'give {such}')}") from None
 
 
 def _exact(context: click.Context, parameter: click.Parameter, text: str | None) -> Fraction | None:
@@ -178,7 +178,7 @@ def click_option(told: Option, **changes: Any) -> Decorator:
     elif told.kind == "parameter":
         more["metavar"] = "NUMBER"
     elif told.kind == "choice":
-        more["type"] = click.Choice(list(told.choices))
+        more["type"] = click.Choice(list(told.choices), case_sensitive=False)
     elif told.kind == "count":
         more["type"] = click.IntRange(told.least, told.most)
     elif told.kind == "float":

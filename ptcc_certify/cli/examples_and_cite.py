@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,17 +10,23 @@ from typing import TYPE_CHECKING
 import click
 
 from ptcc_certify.cli.terminal import print_lines, progress
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import ExitCode, ParameterError
 
 if TYPE_CHECKING:
     from ptcc_certify.report.example_results import Run
 
 
 @click.command()
-@click.argument("name", default="all")
+@click.argument("names", metavar="[NAME]", nargs=-1)
 @click.option("-o", "--output", type=click.Path(file_okay=False), help="Write certificates and figures to this folder.")
-@click.option("--format", "suffix", type=click.Choice(["png", "pdf", "svg"]), default="png", help="Of figures.")
-def examples(name: str, output: str | None, suffix: str) -> int:
+@click.option(
+    "--format",
+    "suffix",
+    type=click.Choice(["png", "pdf", "svg"], case_sensitive=False),
+    default="png",
+    help="Of figures.",
+)
+def examples(names: tuple[str, ...], output: str | None, suffix: str) -> int:
     """Run the paper's examples (all, a number 1 to 6, or a graph such as fig1a) and print two lines each.
 
     worst and reached are of the simulated run, all else is proved. With -o also every certificate, the figures of the
@@ -31,7 +38,10 @@ def examples(name: str, output: str | None, suffix: str) -> int:
     from ptcc_certify.examples import select
     from ptcc_certify.examples.published import PUBLISHED
 
-    if name == "published" or name in PUBLISHED:
+    name = names[-1] if names else "all"
+    if len(names) > 1 and (len(names) > 2 or names[0] != "published"):
+        raise ParameterError(f"{len(names)} names: examples are run one at a time, or all; give one name")
+    if "published" in names or name in PUBLISHED:
         return _published(name, output, suffix)
     selection = select(name)
     _make(output)
@@ -107,10 +117,38 @@ def _draw(runs: Sequence[Run], folder: Path, suffix: str) -> None:
 
 
 @click.command()
-@click.argument("theorem", required=False)
-def cite(theorem: str | None) -> int:
-    """Print BibTeX of the source, with the THEOREM used (such as 2.1) in the note."""
-    from ptcc_certify.theorems.table import cite as bibtex
+@click.argument("theorem", metavar="[THEOREM|CERTIFICATE|software]", nargs=-1)
+def cite(theorem: tuple[str, ...]) -> int:
+    """Print BibTeX of the source, with the THEOREM used (such as 2.1) in the note, or those of a CERTIFICATE.
 
-    click.echo(bibtex(theorem))
-    return 0
+    software prints that of this program.
+    """
+    from ptcc_certify.theorems.table import cite as bibtex
+    from ptcc_certify.theorems.table import cite_software
+
+    words = " ".join(theorem)
+    named = re.sub(r"(?i)^theorem\s*", "", words)
+    if named == "software":
+        click.echo(cite_software())
+        return ExitCode.OK
+    from ptcc_certify.certificate.certificate_file import RejectedCertificate
+
+    try:
+        applied = _theorems_of(words) if Path(words).suffix.lower() == ".json" else [named] * bool(named)
+    except RejectedCertificate as error:
+        print_lines(f"rejected: {error}", err=True)
+        return ExitCode.VIOLATED
+    click.echo(bibtex(*applied))
+    return ExitCode.OK
+
+
+def _theorems_of(path: str) -> list[str]:
+    """Return the theorems of the source that a certificate applies."""
+    from ptcc_certify.certificate.certificate import read_certificate
+
+    certificate = read_certificate(path)
+    if certificate.of_family:
+        raise ParameterError(
+            f"{path}: of a family, to which no theorem of the source applies; ptcc cite alone prints the source"
+        )
+    return list(dict.fromkeys(claim.theorem for claim in certificate.graph_proof.claims))

@@ -6,13 +6,14 @@ Commands take theirs as keywords; the functions here take what they need from th
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from fractions import Fraction
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from lmi.exact.decimal_rounding import counted
 from ptcc_certify.cli import click_options as declared
@@ -123,7 +124,11 @@ certificate_argument = click.argument("certificate", callback=_certificate, type
 def kind_option(text: str) -> declared.Decorator:
     """Return the option that tells the protocol; it comes before the others, which may be of one protocol alone."""
     told = replace(declared.KIND, help=text)
-    more: dict[str, Any] = {"type": click.Choice(list(told.choices)), "default": told.default, "help": told.help}
+    more: dict[str, Any] = {
+        "type": click.Choice(list(told.choices), case_sensitive=False),
+        "default": told.default,
+        "help": told.help,
+    }
     return click.option(told.flag, told.name, is_eager=True, callback=kind_of_protocol, **more)
 
 
@@ -173,6 +178,15 @@ class OneGraph(declared.Command):
         if rest and not ctx.resilient_parsing:
             raise ParameterError(takes_one_graph(self.name))
         return rest
+
+
+def refuse_beside_certificate(path: str, taken: Sequence[str]) -> None:
+    """Refuse what is given on the command line about a graph where a certificate stands in its place."""
+    context = click.get_current_context()
+    for parameter in context.command.params:
+        given = context.get_parameter_source(parameter.name or "") is ParameterSource.COMMANDLINE
+        if given and parameter.name not in taken:
+            raise ParameterError(f"{parameter.opts[0]} is for a graph; the certificate {path} has its own")
 
 
 def written(certificate: Certificate, output: str) -> str:

@@ -82,7 +82,7 @@ class _Figure(click.Choice):  # type: ignore[type-arg]  # no generic class befor
 @click.option(
     "--for",
     "purpose",
-    type=click.Choice(["ieee", "nature", "slide"]),
+    type=click.Choice(["ieee", "nature", "slide"], case_sensitive=False),
     default="ieee",
     help="Sizes of figure and text: columns of a journal of the IEEE, 3.5 or 7.16 inches, or of Nature, 89 or 183 mm; "
     "a slide of 16 to 9.",
@@ -161,10 +161,7 @@ def _of_certificate(path: str, what: str | None, options: shared.Options) -> tup
     from ptcc_certify.certificate.certificate import read_certificate
 
     context = click.get_current_context()
-    for parameter in context.command.params:
-        given = context.get_parameter_source(parameter.name or "") is ParameterSource.COMMANDLINE
-        if given and parameter.name not in _OF_CERTIFICATES:
-            raise ParameterError(f"{parameter.opts[0]} is for a graph; the certificate {path} has its own")
+    shared.refuse_beside_certificate(path, _OF_CERTIFICATES)
     begins = any(context.get_parameter_source(name) is ParameterSource.COMMANDLINE for name in ("x0", "seed"))
     with progress(("independent check", "simulation")) as begin:
         begin("independent check")

@@ -20,6 +20,7 @@ from ptcc_certify.cli.scenario import BESIDE
 from ptcc_certify.cli.terminal import FIGURES, print_lines, progress, refuse_output
 from ptcc_certify.errors import ExitCode, ParameterError
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.recognised_files import kind_of
 from ptcc_certify.lazy_report import rendered
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.case import Case
@@ -73,6 +74,8 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
 
     For example: ptcc simulate fig1b --T 2 --x0 5,2,-4,1,0,3 -o run.png
 
+    In place of a graph stands a certificate of one, which is checked, and run from its initial state.
+
     The columns are t, remaining (1 - t/T, accurate near the deadline), the state of every agent headed by its label,
     under the sliding-mode protocol sigma(<label>), and the input u(<label>). Near the deadline the infinite gain
     multiplies what the integrator leaves of the error: there u is rounding, which `ptcc plot --what input` leaves out.
@@ -102,6 +105,8 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
     if suffix not in (*FIGURES, *_TABLES):
         raise ParameterError(f"{output}: CSV is written to .csv, figures to {', '.join(FIGURES)}; choose one of these")
     refuse_output(output)
+    if kind_of(graph[0]) == "a certificate":
+        return _of_certificate(graph, output, options["samples"], {"wide": wide, "time_unit": time_unit})
     protocol = shared.protocol_of(options, ("delta", "disturbance"))
     signed = families.read_graph_or_family(graph, options)
     if isinstance(signed, Family):
@@ -135,6 +140,34 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
         return ExitCode.OK
     if protocol.prescribed and trajectory.conditions.actuator is None and not trajectory.deadline_resolved:
         click.echo("note: the run had not settled at the deadline; raise rho2 * kappa", err=True)
+    return ExitCode.OK
+
+
+def _of_certificate(graph: tuple[str, ...], output: str | None, samples: int, look: dict[str, Any]) -> int:
+    """Write the run of what a certificate is about, which is checked first."""
+    from ptcc_certify.certificate.certificate import read_certificate
+    from ptcc_certify.certificate.certificate_file import RejectedCertificate
+
+    shared.refuse_beside_certificate(graph[0], ("graph", "output", *look))
+    if len(graph) > 1:
+        raise ParameterError(f"{graph[0]}: is a certificate, which is run by itself; leave out {graph[1]}")
+    try:
+        with progress(("independent check", "simulation")) as begin:
+            begin("independent check")
+            certificate = read_certificate(graph[0])
+            if certificate.of_family:
+                mend = "simulate its graphs: ptcc simulate GRAPH.. --switching"
+                raise ParameterError(f"{graph[0]}: is of a family, which has a run for every signal; {mend}")
+            begin("simulation")
+            part = certificate.proof.agents
+            own = certificate.asked_trajectory if part is None else part.simulate(samples=samples)
+            run = own or certificate.simulate(samples=samples)
+    except RejectedCertificate as error:
+        print_lines(f"rejected: {error}", err=True)
+        return ExitCode.VIOLATED
+    _write(run, output, "trajectory.plot_run" if part is None else "motion.plot_motion", look)
+    if own is None and (certificate.proof.late is not None or certificate.limits):
+        click.echo("note: the run is of the protocol alone, without limits, and nothing late", err=True)
     return ExitCode.OK
 
 

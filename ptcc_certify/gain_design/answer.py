@@ -451,10 +451,10 @@ class AgentsDesign(DesignAnswer):
 
     @property
     def gains_text(self) -> str:
-        """The parameters of the protocol, exact, and the gains of the agents; empty where there are none."""
+        """The parameters of the protocol, exact, and the input of the agents; empty where there are none."""
         if self.certificate is None or self.certificate.proof.agents is None:
             return ""
-        return f"{super().gains_text}; {self.certificate.proof.agents.gains_text}"
+        return f"{super().gains_text}; u = {self.certificate.proof.agents.protocol.law()}"
 
     def facts(self) -> Facts:
         """Return what is told of it, the largest input of a run last."""

@@ -478,19 +478,32 @@ class SignedDigraph(ReadOnly, Shown):
             rows.append({**row, node: total} if total else {})
         return rows
 
-    def subgraph(self, nodes: Sequence[int] | np.ndarray) -> SignedDigraph:
-        """Return the graph induced by the node indices ``nodes``, in that order.
+    def subgraph(self, nodes: Sequence[int | str] | np.ndarray) -> SignedDigraph:
+        """Return the graph induced by some nodes, in the order in which they are given.
+
+        Parameters
+        ----------
+        nodes : sequence of int or str
+            Indices, or labels if these are texts.
 
         Raises
         ------
-        GraphError
+        UnknownAgentError, GraphError
             There is no such node, or none at all.
+
+        Examples
+        --------
+        >>> graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -2)])
+        >>> graph.subgraph(["c", "b"]).labels, graph.subgraph([1, 2]).labels
+        (('c', 'b'), ('b', 'c'))
         """
+        if not isinstance(nodes, np.ndarray) and any(isinstance(node, str) for node in nodes):
+            nodes = [place_of(node, self.labels) for node in nodes]
         nodes = np.asarray(nodes)
         if not nodes.size:
             nodes = nodes.astype(np.int64)
         elif nodes.ndim != 1 or nodes.dtype.kind not in "iu" or not 0 <= nodes.min() <= nodes.max() < self.n_nodes:
-            raise GraphError(f"a node of a subgraph is an index from 0 to {self.n_nodes - 1}; index[label] tells it")
+            raise GraphError(f"a node of a subgraph is an index from 0 to {self.n_nodes - 1}, or a label, a text")
         position = np.full(self.n_nodes, -1, dtype=np.int64)
         position[nodes] = np.arange(nodes.size)
         keep = np.flatnonzero((position[self.source] >= 0) & (position[self.target] >= 0))
@@ -642,8 +655,8 @@ class SignedDigraph(ReadOnly, Shown):
 
 #: What a matrix without an orientation is refused with.
 WAY = (
-    'does not tell its direction: say orientation="listens" if row k holds whom k listens to (the paper\'s W), or '
-    '"information" if row k holds whom k informs (networkx.to_numpy_array)'
+    'does not tell its direction: write as_graph(W, orientation="listens") if row k holds whom k listens to (the '
+    'paper\'s W), or "information" if row k holds whom k informs (networkx.to_numpy_array)'
 )
 _READ_DEFAULT: dict[str, Any] = {
     "orientation": "information",

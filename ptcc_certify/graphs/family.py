@@ -24,7 +24,7 @@ from ptcc_certify.errors import GraphError, NumberError, ParameterError, did_you
 from ptcc_certify.graphs.digraph import CallableTuple, Exact, SignedDigraph
 from ptcc_certify.graphs.labels import import_pandas, ordered_labels, refuse_unnamed, refuse_written_twice
 from ptcc_certify.graphs.packed_weights import LARGEST_WEIGHT, SMALLEST_WEIGHT, Weights
-from ptcc_certify.graphs.rationals import as_fraction, format_exact, nearest_float, shorten
+from ptcc_certify.graphs.rationals import as_fraction, decimal_mend, format_exact, nearest_float, shorten
 from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.lazy_report import Shown
 
@@ -540,7 +540,7 @@ def read_interval(first: Any, last: Any, place: str) -> tuple[Fraction, Fraction
     try:
         least, largest = as_fraction(first, "the least weight"), as_fraction(last, "the largest weight")
     except NumberError as error:
-        mend = "write decimals with a point" if "," in str(error).rpartition('"')[0] else "give a number"
+        mend = decimal_mend(str(error).rpartition('"')[0].rpartition('"')[2])
         raise GraphError(f"{place}: {error}; {mend}") from None
     for end in (least, largest):
         if end and not SMALLEST_WEIGHT <= abs(nearest_float(end)) <= LARGEST_WEIGHT:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import operator
+import re
 from contextlib import suppress
 from decimal import Context, Decimal, Inexact
 from fractions import Fraction
@@ -96,6 +97,20 @@ def no_number(value: Any, error: NumberError) -> str:
     """
     plain = str(error).endswith(("not a number", "not a finite number"))
     return f"= {shorten(str(value))} is not a finite number" if plain else str(error)
+
+
+def decimal_mend(text: str, otherwise: str = "give a number") -> str:
+    """Return how a text is mended that is no number: with a point where it has a decimal comma.
+
+    Examples
+    --------
+    >>> decimal_mend("1,5"), decimal_mend("1,5 m"), decimal_mend("fast")
+    ('write decimals with a point, 1.5', 'write decimals with a point', 'give a number')
+    """
+    if "," not in text:
+        return otherwise
+    own = f", {text.replace(',', '.')}" if re.fullmatch(r"[-+]?\d{1,20},\d{1,20}", text.strip()) else ""
+    return f"write decimals with a point{own}"
 
 
 def whole_number(value: Any, name: str, least: int, most: int) -> int:

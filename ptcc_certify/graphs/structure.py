@@ -256,8 +256,9 @@ class Structure(ReadOnly, Shown):
     def to_pandas(self) -> pd.DataFrame:
         """Return one row per node.
 
-        Its ``role`` is leader or follower; ``group`` is the number of a leader's closed component, ``camp`` +1 or -1
-        within it (0 if that is unbalanced), both missing for followers; ``component`` that of the weakly connected one.
+        Its ``role`` is leader or follower; ``group`` is the number of a leader's closed component, missing for
+        followers; ``component`` that of the weakly connected one. ``camp`` is +1 or -1 within the component if the
+        whole graph is balanced; else within a leader's group, 0 if that is unbalanced, and missing for followers.
 
         Raises
         ------
@@ -275,6 +276,7 @@ class Structure(ReadOnly, Shown):
         for number, closed in enumerate(self.closed_components, start=1):
             for node, side in zip(closed.nodes, closed.gauge or (0,) * len(closed.nodes), strict=True):
                 group[node], camp[node] = number, side
+        camp = camp if self.gauge is None else self.gauge.tolist()
         columns = {
             "role": ["follower" if number is None else "leader" for number in group],
             "group": pandas.array(group, dtype="Int64"),

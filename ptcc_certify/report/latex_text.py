@@ -30,7 +30,7 @@ _ROOT = re.compile(r"\\sqrt (\S+)")
 _STOPS = (",", ";", ":", ".")
 #: Words that are formulas: numbers and signs; letters other than the article, and Greek ones by their names.
 _NAME = rf"([b-zA-Z]|{'|'.join(LETTERS)}|int|dt|min|Re|sqrt)(_\w)?'*(\(.*)?"
-_FORMULA = re.compile(rf".*[0-9|<>=^+].*|[-/]|{_NAME}|(sign|lmin|lmax)\(.*")
+_FORMULA = re.compile(rf".*[0-9|<>=^+].*|[-/]|-?{_NAME}|(sign|lmin|lmax)\(.*")
 
 
 def latex_of_text(text: str) -> Markup:
@@ -73,6 +73,8 @@ def latex_of_sentence(sentence: Sentence) -> Markup:
     --------
     >>> print(latex_of_sentence("at 0.99 T: ||E|| <= 6e-03 ||E(0)||, each within 0.025"))
     at $0.99\, T$: $\|E\| \le 6 \cdot 10^{-3}\, \|E(0)\|$, each within $0.025$
+    >>> print(latex_of_sentence("E = -L x: by how much each agent differs"))
+    $E = -L\, x$: by how much each agent differs
     """
     text = spell(sentence, as_parameters, marked=True).replace(NO_BREAK, " ")
     return Markup("").join(

@@ -76,13 +76,13 @@ def theorem_for(graph: Any, protocol: str | Protocol = "nominal") -> Theorem:
     return next(theorem for theorem in rows if theorem.applies(structure))
 
 
-def cite(theorem: str | None = None) -> str:
+def cite(*theorems: str) -> str:
     """Return BibTeX of the source.
 
     Parameters
     ----------
-    theorem : str, optional
-        Such as ``"2.1"``; its statement stands in the note.
+    *theorems : str
+        Such as ``"2.1"``; their statements stand in the note.
 
     Returns
     -------
@@ -99,8 +99,8 @@ def cite(theorem: str | None = None) -> str:
       note   = {Manuscript; Theorem 1.1: Strongly connected, structurally balanced: bipartite consensus at T.}
     """
     note, statements = "Manuscript", {row.number: row.statement for row in THEOREMS}
-    if theorem is not None:
-        if (theorem := str(theorem)) not in statements:
+    for theorem in map(str, theorems):
+        if theorem not in statements:
             hint = did_you_mean(theorem, statements)
             raise ParameterError(f'no theorem "{shorten(theorem)}"; one of {", ".join(statements)}{hint}')
         note += f"; Theorem {theorem}: {statements[theorem]}"
@@ -111,5 +111,25 @@ def cite(theorem: str | None = None) -> str:
         "  title  = {Robust prescribed-time coordination control of cooperative-antagonistic networks with "
         "disturbances},\n"
         f"  note   = {{{note}}}\n"
+        "}"
+    )
+
+
+def cite_software() -> str:
+    """Return BibTeX of this program, as CITATION.cff has it.
+
+    Examples
+    --------
+    >>> print(cite_software().splitlines()[0])
+    @software{ptcc_certify,
+    """
+    from ptcc_certify import __version__
+
+    return (
+        "@software{ptcc_certify,\n"
+        "  author  = {{ptcc-certify contributors}},\n"
+        "  title   = {ptcc-certify: certify prescribed-time coordination control on signed digraphs},\n"
+        f"  version = {{{__version__}}},\n"
+        "  note    = {MIT license}\n"
         "}"
     )

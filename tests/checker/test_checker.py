@@ -58,6 +58,7 @@ from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.late_messages import LateMessages
 
 CLASSES = dict(all_classes())
 PACKAGE = Path(ptcc_certify.__file__).parent
@@ -1191,3 +1192,21 @@ def test_integers_of_64_bits_in_a_file_are_integers(tmp_path: Path) -> None:
     (tmp_path / "c.json").write_text(json.dumps({"schema": "ptcc-certificate/3", "data": values}))
     found = checker.read(tmp_path / "c.json")["data"]
     assert found == values and {type(x) for x in found} == {int}
+
+
+def test_an_accepted_certificate_tells_what_it_states(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    protocol, asks = NominalProtocol(T="1/3", rho1=1, rho2=2, kappa=1), Asks(simulation=False)
+    chain = [(k, k + 1, -1) for k in range(4)]
+    data = certify(chain, protocol, ["1/7", 2, 4, 8, 16], asks=asks, messages=LateMessages("0.001")).to_dict()
+    (tmp_path / "c.json").write_text(json.dumps(data), encoding="utf-8")
+    assert checker.main([str(tmp_path / "c.json")]) == 0
+    *_, protocol_line, claim, states, beside, last = capsys.readouterr().out.splitlines()
+    assert protocol_line == "protocol   nominal: T=1/3, rho1=1, rho2=2, kappa=1; 5 nodes"
+    assert claim == "claim      interval bipartite consensus (Theorem 2.1)" and last.startswith("accepted")
+    assert states == "x(T)       0 at 1/7, 1 at -1/7, 2 at 1/7, 3 at -1/7, .."
+    assert beside == "beside     messages: claim and x(T) are without these"
+    (tmp_path / "c.json").write_text(json.dumps(data | {"verdict": "undecided"}), encoding="utf-8")
+    assert len(checker.stated(data)) == 4
+    assert [line.split()[0] for line in checker.stated(with_side_files(data)[0])] == ["protocol", "claim", "beside"]
+    assert checker.main([str(tmp_path / "c.json")]) == 1
+    assert "claim  " not in capsys.readouterr().out

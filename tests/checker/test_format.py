@@ -364,6 +364,7 @@ def test_words_and_sections_that_do_not_fit_are_not_valid():
         (changed(data, ("structure", 0, "connectivity"), "disconnected"), "the graph is strong"),
         ({**data, "structure": data["structure"] * 2}, "structure has not one entry"),
         (without(data, ("claim",)), "the claim is Theorem 1.1"),
+        (changed(data, ("claim", "behaviour"), "stability"), "the claim is bipartite consensus by Theorem 1.1"),
         ({**data, "components": []}, "components of a connected graph"),
         ({**data, "boxes": []}, "boxes has no place for one graph"),
         ({**data, "drives": []}, "drives has no place for one graph"),

@@ -175,6 +175,8 @@ COMMANDS = [
     "certify chain.csv --plant 1,1",
     "certify chain.csv --rest 1",
     "certify chain.csv --dimension 2",
+    "certify chain.csv --dimension 2 --agents 2 --delay 0.01",
+    "certify chain.csv --dimension 2 --agents double-integrator --exchange virtual --delay 0.01",
     "certify chain.csv --own-delay",
     "certify chain.csv --own-delay --delay 0.01",
     "certify chain.csv --packet-loss 1",

@@ -161,6 +161,13 @@ def test_a_scenario_tells_the_agents(tmp_path: Path):
         (("--agents", "2", "--a0", "1,2,3,4,5,6"), "--a0: agents of order 2 have no acceleration"),
         (("--agents", "2", "--initial-bound", "3"), "--initial-bound: is not proved of agents of order n"),
         (("--agents", "9"), "or an order from 1 to 8"),
+        *(
+            (("--agents", "2", "--dimension", "2", "--delay", "0.01", *more), "--dimension: " + what)
+            for more, what in (
+                ((), "late messages and leaders that move take one coordinate at a time"),
+                (("--exchange", "virtual"), "vehicles that exchange virtual positions take one coordinate at a time"),
+            )
+        ),
     ],
 )
 def test_what_does_not_fit_agents_is_refused_in_one_line(options: tuple[str, ...], says: str):
@@ -244,6 +251,8 @@ def test_design_takes_a_scenario_of_agents_and_prints_the_command_that_proves_it
     command = done.out.split("to prove it again:")[1].replace("\\\n", " ").split()
     again = ptcc(*command[1:], "--no-simulation")
     assert again.code == 0 and "verdict    met: |u_k| <= 30" in again.out
+    (law,) = re.findall(r"; (u = \S+ g\^2 e \+ \S+ g e')", " ".join(done.out.split()))
+    assert law in " ".join(again.out.split())
     assert ptcc("check", str(saved)).code == 0
     assert json.loads(saved.read_text())["unverified"]["scenario"]["design"] == {"shortest_deadline": True}
 
@@ -358,7 +367,7 @@ def test_a_deadline_of_the_cascade_is_designed_and_proved_again_by_the_command_t
     asked = ("--agents", "2", "--cascade", "2", "--v0", "random", "--max-input", "40", "--shortest-deadline")
     done = ptcc("design", "fig1a", *asked)
     told = " ".join(done.out.replace("\\\n", " ").split())
-    assert done.code == 0 and "verdict met: ||u_k|| <= " in told and "alpha 2" in told
+    assert done.code == 0 and "verdict met: ||u_k|| <= " in told and "; u = (2 g^2 + g') e + g e' - 2 g x'" in told
     (command,) = re.findall(r"ptcc (certify fig1a .*?--max-input 40)", told)
     again = ptcc(*shlex.split(command), "--no-simulation")
     assert again.code == 0 and "met: |u_k| <= 40" in " ".join(again.out.split())

@@ -29,7 +29,7 @@ from ptcc_certify.bounds.envelope import Envelope
 from ptcc_certify.checker import check, read
 from ptcc_certify.examples import EXAMPLES, GRAPHS, load_graph, select
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.io import write_graph
+from ptcc_certify.graphs.io import read_graph, write_graph
 from ptcc_certify.graphs.structure import BEHAVIOURS, analyse
 from ptcc_certify.report.screen import check_summary
 
@@ -719,6 +719,17 @@ def test_the_screen_of_certify_fits_24_lines(name: str):
         assert "Theorem" in run.out
 
 
+def test_camps_of_followers_are_told_where_the_whole_graph_is_balanced(tmp_path: Path):
+    file = tmp_path / "led.csv"
+    file.write_text("a,b,-1\nb,a,-1\nb,c,1\nc,d,-2\n")
+    assert "camps      of all {a, d} against {b, c}" in ptcc("classify", str(file)).out
+    camp = analyse(read_graph(file)).to_pandas()["camp"]
+    assert camp.to_dict() == {"a": 1, "b": -1, "c": -1, "d": 1}
+    file.write_text("a,b,-1\nb,a,-1\nb,c,1\na,c,1\n")
+    assert "of all" not in ptcc("classify", str(file), "-v").out
+    assert analyse(read_graph(file)).to_pandas()["camp"].isna().to_dict() == {"a": False, "b": False, "c": True}
+
+
 def test_the_screen_of_classify_names_camps_and_cycles():
     out = ptcc("classify", "fig1b").out
     assert "camps {1, 2, 5, 6} against {3, 4}" in out
@@ -1074,6 +1085,31 @@ def test_cite_is_bibtex_and_invents_nothing(theorem: str | None):
     assert all(text.count("{") == text.count("}") for text in fields.values())
     if theorem:
         assert f"Theorem {theorem}: " in fields["note"]
+        assert ptcc("cite", f"Theorem {theorem}").out == ptcc("cite", "theorem", theorem).out == run.out
+
+
+def test_cite_takes_a_certificate_and_the_software(tmp_path: Path):
+    corpus = Path(__file__).parents[1] / "corpus"
+    assert ptcc("cite", str(corpus / "fig3a.json")).out == ptcc("cite", "2.1").out
+    parts = ptcc("cite", str(corpus / "parts.json")).out
+    assert "Theorem 2.1: " in parts and "Theorem 1.2: " in parts
+    refused = ptcc("cite", str(corpus / "uncertain.json"))
+    assert refused.code == 2 and "ptcc cite alone prints the source" in refused.err
+    forged = json.loads((corpus / "fig3a.json").read_text(encoding="utf-8")) | {"verdict": "undecided"}
+    (tmp_path / "forged.json").write_text(json.dumps(forged), encoding="utf-8")
+    assert ptcc("cite", str(tmp_path / "forged.json")).code == 1
+    software, facts = ptcc("cite", "software").out, (Path(__file__).parents[2] / "CITATION.cff").read_text("utf-8")
+    for field in ("title", "version"):
+        (said,) = re.findall(rf"^  {field} *= \{{(.*)\}},$", software, flags=re.MULTILINE)
+        assert re.search(rf'^{field}: "?{re.escape(said)}"?$', facts, flags=re.MULTILINE)
+    assert "- name: ptcc-certify contributors\n" in facts and "{{ptcc-certify contributors}}" in software
+
+
+def test_published_examples_are_run_by_name():
+    assert ptcc("examples", "published", "french").out == ptcc("examples", "french").out
+    for words, mend in ((("published", "fig1a"), "use leader_of_two_camps"), (("1", "2"), "give one name")):
+        refused = ptcc("examples", *words)
+        assert refused.code == 2 and mend in refused.err
 
 
 @pytest.mark.few(0)

@@ -159,7 +159,7 @@ def test_what_is_neither_graph_nor_certificate_is_named(name: str):
 
 
 def test_a_graph_and_a_certificate_in_the_place_of_the_other_are_told_with_the_command(certificate: str):
-    for command in ("certify", "classify", "simulate", "new"):
+    for command in ("certify", "classify", "new"):
         run = ptcc(command, certificate)
         assert run.code == 2 and f"is a certificate, not a graph; ptcc check {certificate}" in run.err
     for graph in ("team.csv", "fig1a"):
@@ -352,3 +352,38 @@ def test_a_missing_file_names_first_what_begins_alike(tmp_path: Path, monkeypatc
     for name in ("crew_of_monday_morning.csv", "screw.csv", "other.csv"):
         Path(name).write_text("a,b,1\n")
     assert "did you mean crew_of_monday_morning.csv?" in ptcc("classify", "crew.csv").err
+
+
+def test_the_deadline_under_another_name_and_words_in_capitals():
+    for words, flag in ((("--deadline", "3"), "--deadline"), (("-T", "3"), "-T")):
+        assert ptcc("certify", "team.csv", *words).err == f"ptcc: No such option '{flag}'. Did you mean --T?\n"
+    loud, plain = (ptcc("classify", "team.csv", "--edges", word) for word in ("Listens", "listens"))
+    assert loud.code == 0 and loud.out == plain.out
+    assert ptcc("certify", "team.csv", "--protocol", "Nominal", "--method", "Paper").code == 0
+
+
+def test_what_is_no_number_is_told_how_one_looks():
+    for text, mend in (("fast", "give a number such as 0.5"), ("0,5", "write decimals with a point, 0.5")):
+        told = ptcc("certify", "team.csv", "--leader-speed", text)
+        assert told.code == 2 and told.err == f'ptcc: --leader-speed: "{text}" is not a number; {mend}\n'
+
+
+def test_a_certificate_is_run_as_its_graph_is(tmp_path: Path):
+    words = ("--x0", "1,2,3,4", "--T", "2")
+    for more in (
+        (),
+        ("--gain-cap", "9"),
+        ("--agents", "2"),
+        ("--protocol", "sliding-mode", "--T-r", "1", "--T-s", "1"),
+    ):
+        given = (*words[: 2 if "--T-r" in more else 4], *more)
+        ptcc("certify", "team.csv", *given, "--no-simulation", "-o", "c.json")
+        by_graph, by_certificate = ptcc("simulate", "team.csv", *given), ptcc("simulate", "c.json")
+        assert by_certificate.code == 0 and by_certificate.out == by_graph.out, more
+    refused = ptcc("simulate", "c.json", "--T", "3")
+    assert refused.code == 2 and refused.err == "ptcc: --T is for a graph; the certificate c.json has its own\n"
+    forged = json.loads(Path("c.json").read_text(encoding="utf-8")) | {"verdict": "undecided"}
+    Path("c.json").write_text(json.dumps(forged), encoding="utf-8")
+    assert ptcc("simulate", "c.json").code == 1
+    ptcc("certify", "team.csv", "--uncertainty", "1%", "--no-simulation", "-o", "f.json")
+    assert "--switching" in ptcc("simulate", "f.json").err

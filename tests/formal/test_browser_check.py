@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import random
+import re
 import subprocess
 from itertools import islice
 from pathlib import Path
@@ -13,6 +14,8 @@ import pytest
 from mutations import mutants, resealed
 from side_files import with_side_files
 from verified import program
+
+from ptcc_certify import checker
 
 FORMAL = Path(__file__).resolve().parents[2] / "formal"
 PAGE = FORMAL / "browser" / "check.html"
@@ -37,7 +40,7 @@ def answered(page: Any, file: Path) -> tuple[int, str]:
     page.set_input_files("#files", str(file))
     page.wait_for_function(f"{list(CODES)}.includes(document.getElementById('answer').className)", timeout=60_000)
     kind = page.get_attribute("#answer", "class")
-    shown = page.locator("#answer > pre")
+    shown = page.locator("#answer > pre:not(.stated)")
     return CODES[kind], shown.text_content() if shown.count() else ""
 
 
@@ -116,6 +119,12 @@ def test_what_is_no_certificate_is_told(page: Any, tmp_path: Path) -> None:
         file = tmp_path / "c.json"
         file.write_text(text)
         assert answered(page, file)[0] == 2
+    file.write_text("a,b,1")
+    code, text = answered(page, file)
+    assert code == 2 and "this is no certificate" in text
+    file.write_bytes(b"\xef\xbb\xbf" + (CORPUS / "fig3a.json").read_bytes())
+    assert answered(page, file) == told(CORPUS / "fig3a.json")
+    assert "claim      interval bipartite consensus (Theorem 2.1)" in page.text_content("#answer > .stated")
 
 
 def test_integers_of_the_browser_are_what_they_should_be(tmp_path: Path) -> None:
@@ -153,6 +162,47 @@ console.log(JSON.stringify(told));
     run = subprocess.run(["node", file], capture_output=True, text=True, check=True)
     for (x, y), row in zip(pairs, json.loads(run.stdout), strict=True):
         assert row == [str(number) for number in _expected(x, y)], (x, y)
+
+
+def of_page(expression: str, folder: Path) -> Any:
+    """Return what an expression gives with the functions of the page that need no browser, by Node.js."""
+    if not _has_node():
+        pytest.skip("no Node.js")
+    source = (FORMAL / "browser" / "page.html").read_text(encoding="utf-8")
+    functions = [re.search(rf"function {name}\(.*?\n}}\n", source, re.DOTALL) for name in ("stated", "certificateText")]
+    file = folder / "page.js"
+    text = "".join(found[0] for found in functions if found)
+    file.write_text(f"{text}console.log(JSON.stringify({expression}))", encoding="utf-8")
+    return json.loads(subprocess.run(["node", file], capture_output=True, text=True, check=True).stdout)
+
+
+def test_the_page_tells_what_a_certificate_states_as_the_checker_in_python_does(tmp_path: Path) -> None:
+    read = "JSON.parse(require('fs').readFileSync(path, 'utf8'))"
+    files = [str(path) for path in sorted(CORPUS.glob("*.json"))]
+    told = of_page(f"{json.dumps(files)}.map((path) => stated({read}))", tmp_path)
+    kinds = set()
+    for path, lines in zip(files, told, strict=True):
+        own = checker.stated(json.loads(Path(path).read_text(encoding="utf-8")))
+        assert 2 <= len(lines) <= 4
+        for line, other in zip(lines, own, strict=True):
+            rounded = " about " in line or " within " in line
+            assert line[:11] == other[:11] and (rounded or line == other), path
+            kinds.add((line.split()[0], rounded))
+    assert kinds == {("protocol", False), ("claim", False), ("x(T)", False), ("x(T)", True), ("beside", False)}
+
+
+def test_the_page_takes_a_byte_order_mark_and_tells_what_is_no_json(tmp_path: Path) -> None:
+    texts = [b'{"a": 1}', b'\xef\xbb\xbf{"a": 1}', b"\n {", b"a,b,1", b"", b"\xef\xbb\xbfa;b", b"PK\x03"]
+    given = json.dumps([text.decode("latin-1") for text in texts])
+    assert of_page(f"{given}.map(certificateText)", tmp_path) == [
+        '{"a": 1}',
+        '{"a": 1}',
+        "\n {",
+        None,
+        None,
+        None,
+        None,
+    ]
 
 
 def _has_node() -> bool:

@@ -244,6 +244,7 @@ def test_a_subgraph_is_induced(made, data):
     graph = build(names, weights)
     chosen = data.draw(st.lists(st.sampled_from(range(graph.n_nodes)), min_size=1, unique=True))
     part = graph.subgraph(chosen)
+    assert part.labels == graph.subgraph([graph.labels[i] for i in chosen]).labels
     assert part.labels == tuple(graph.labels[i] for i in chosen)
     inside = set(part.labels)
     assert {(s, t): w for s, t, w in part.edges} == {p: w for p, w in weights.items() if inside.issuperset(p)}

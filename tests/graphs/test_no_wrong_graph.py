@@ -1229,7 +1229,7 @@ def test_all_that_is_wrong_with_delays_is_one_message(tmp_path):
     with pytest.raises(FormatError) as told:
         read_delays(path, read_graph(path))
     said = str(told.value)
-    assert 'line 2: delay "0,5" of edge a -> b is not a number (write decimals with a point)' in said
+    assert 'line 2: delay "0,5" of edge a -> b is not a number (write decimals with a point, 0.5)' in said
     assert "line 3: delay -1 of edge b -> c is negative (2 in all) (give a number >= 0); mend these" in said
 
 
@@ -1256,7 +1256,7 @@ def test_names_of_a_matrix_that_are_not_read_are_told(tmp_path):
 def test_decimal_commas_of_intervals_and_ends_without_their_names_are_told(tmp_path):
     path = tmp_path / "e.csv"
     path.write_text('source,target,min,max\na,b,"-0,5",1\n')
-    with pytest.raises(GraphError, match='"-0,5" is not a number; write decimals with a point'):
+    with pytest.raises(GraphError, match=r'"-0,5" is not a number; write decimals with a point, -0\.5'):
         read_family(path)
     path.write_text("node1,node2,weight_min,weight_max\na,b,1,2\n")
     with pytest.raises(FormatError, match="name the columns of the ends source and target"):

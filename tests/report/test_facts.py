@@ -6,7 +6,6 @@ import re
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -18,7 +17,6 @@ from lmi.exact.decimal_rounding import down, up
 from ptcc_certify.cli.terminal import flagged
 from ptcc_certify.errors import Change, ParameterError, spell
 from ptcc_certify.report.facts.beside_law import beside_law
-from ptcc_certify.report.facts.late import _within_text
 from ptcc_certify.report.page import set_note
 from ptcc_certify.report.screen import certificate_lines, summary_lines
 
@@ -90,13 +88,20 @@ def test_labels_that_look_like_signs_stand_as_they_are():
     assert "<bdi>&lt;b&gt;</bdi>=" in set_note(end.note)
 
 
-def test_what_holds_from_the_deadline_on_holds_at_it():
-    late: Any = SimpleNamespace(
-        leaders=object(), relative=False, settling=None, vehicles=None, forms=(), goal="its target"
-    )
-    for largest, after, at in ((0.025, 0.0195, "0.02"), (0.0095, 0.0195, "0.0095")):
-        late.largest, late.after = largest, after
-        assert _within_text(late, 2) == f"every follower within {at} of its target at T, within 0.02 from then on"
+def test_what_holds_from_the_deadline_on_holds_at_it_in_every_line():
+    chain = [("L", "a", 1), ("a", "b", 1), ("b", "a", 1), ("b", "c", 1), ("c", "b", 1)]
+    parts: dict[str, Any] = {"agents": ptcc.Agents(order=2, exchange="virtual"), "leaders": ptcc.MovingLeaders("0.5")}
+    parts |= {"messages": ptcc.LateMessages("0.02", gain_cap=2)}
+    asks = ptcc.Asks(simulation=False, method="paper")
+    made = ptcc.certify(chain, ptcc.NominalProtocol(T=20, rho2="0.2"), [0, 4, -2, -1], asks=asks, **parts)
+    assert made.late is not None and made.late.vehicles is not None and made.late.after is not None
+    assert made.late.vehicles.position.max() > 2 * made.late.after == 2 * made.late.largest
+    within = up(made.late.after, 2)
+    assert told(made, "late")[0].startswith(f"every follower within {up(made.late.after, 3)} of its target at T")
+    assert told(made, "left") == [f"at T by agent: a {within}, b {within}, c {within}"]
+    assert told(made, "verdict")[0].endswith(f"every follower within {within} of its target at T")
+    whose = "of virtual positions, without a gain cap, nothing late, leaders at rest"
+    assert told(made, "input")[1] == f"{whose}: NOT BOUNDED from some initial states"
 
 
 def told(certificate: ptcc.Certificate, head: str) -> list[str]:

@@ -15,7 +15,7 @@ from hypothesis import given
 from matplotlib.colors import to_rgb
 
 import ptcc_certify as ptcc
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import ParameterError, unlabelled
 from ptcc_certify.report.facts.influence import influence_facts
 from ptcc_certify.report.plots.influence import plot_influence
 
@@ -24,13 +24,16 @@ TEAM = [("ann", "bob", 1), ("bob", "ann", 1), ("bob", "eve", -2), ("eve", "dan",
 
 @pytest.mark.few(3)
 @given(made_graphs(max_nodes=7))
-def test_rows_of_the_table_times_initial_states_are_final_states(made):
-    """Two routes to the same numbers: the table as text, and the final state that certificates tell."""
+def test_weights_times_initial_states_are_final_states(made):
+    """Two routes to the same numbers: the weights, in the table as floats, and the final state of certificates."""
     who = ptcc.influence(made.graph)
     x0 = {label: Fraction(3 * k * k - 7, k + 2) for k, label in enumerate(made.graph.labels)}
     ends = dict.fromkeys(made.graph.labels, Fraction(0))
-    for row in csv.DictReader(who.to_csv().splitlines()):
-        ends[row["node"]] += Fraction(row["weight"]) * x0[row["leader"]]
+    rows = [(label, j, weight) for k, label in enumerate(x0) for j, weight in who.row(k).items()]
+    for label, j, weight in rows:
+        ends[label] += weight * x0[who.structure.graph.labels[j]]
+    table = list(csv.DictReader(who.to_csv().splitlines()))
+    assert [(row["node"], float(row["weight"])) for row in table] == [(label, float(x)) for label, _, x in rows]
     final = ptcc.final_state(made.graph, list(x0.values()))
     assert ends == dict(zip(final.labels, final.states, strict=True))
     table = np.zeros((len(x0), len(x0)))
@@ -91,9 +94,21 @@ def test_rows_of_up_to_60_nodes_are_named():
 def test_the_command_prints_writes_and_draws(tmp_path: Path):
     run = command("influence", "fig3a", "-o", str(tmp_path / "q.csv"))
     assert run.code == 0 and "decides    2 37.5 %, 3 37.5 %, 1 25 %" in run.out
-    assert (tmp_path / "q.csv").read_text(encoding="utf-8").startswith("node,leader,weight\n1,1,1/4\n")
+    assert (tmp_path / "q.csv").read_text(encoding="utf-8").startswith("node,leader,weight\n1,1,0.25\n")
     assert command("influence", "fig3a", "-o", str(tmp_path / "q.svg")).code == 0
     told = json.loads(command("influence", "fig3a", "--json").out)
     assert told["weights"]["6"] == {"1": "-1/8", "2": "-3/16", "3": "3/16"} and told["exact"]
     refused = command("influence", "fig3a", "-o", str(tmp_path / "q.txt"))
     assert refused.code == 2 and refused.err.count("\n") == 1 and not (tmp_path / "q.txt").exists()
+
+
+def test_long_sums_and_long_names_keep_whole_terms_on_the_short_screen():
+    names = [f"Bürgermeisterin Nummer {k} der Stadt" for k in range(6)]
+    ring = [(names[k], names[(k + step) % 6], k + step) for k in range(6) for step in (1, 2)]
+    _, ends = influence_facts(ptcc.influence([*ring, (names[0], "zoe", -1)]))
+    (brief,) = (unlabelled(text) for text in ends.brief)
+    group, _, rest = brief.partition(" end at ")
+    first, _, more = rest.partition(" + ")
+    assert group == "Bürgerm...er 0 der Stadt, ... (6 in all)" and first.split(" x_")[1].endswith("Stadt")
+    assert "+ ... (6 terms)" in more and brief.endswith(", ... (2 in all)")
+    assert len(brief) <= 140

@@ -430,7 +430,8 @@ def test_a_rejected_certificate_is_called_rejected_and_nothing_else(tmp_path: Pa
     assert made.rate is not None and made.claim is not None
     path = forged(tmp_path, rates={"proved": str(2 * made.rate)}, producer="<script>")
     done = ptcc("report", str(path), "-o", str(tmp_path / "c.html"))
-    assert done.code == 1 and done.out.split() == ["rejected", str(tmp_path / "c.html")]
+    told = [f"rejected   {path}", f"written    {tmp_path / 'c.html'} (tells why)"]
+    assert done.code == 1 and done.out.splitlines() == told
     page = sound_rejection((tmp_path / "c.html").read_text(encoding="utf-8"))
     assert page.text.index("REJECTED") < 100 and "rates" in page.text
     for word in (made.claim.behaviour, "Theorem", "certified at", "CERTIFIED", "bounded"):

@@ -198,14 +198,16 @@ class LateBounds:
 
     @property
     def residuals(self) -> list[np.ndarray]:
-        """What bounds ``|x_k(T) - x_k*|``, of vehicles theirs, by one proof after the other: (N,) arrays."""
-        if self.vehicles is not None:
-            return [self.vehicles.position]
-        if self.direct:
+        """What bounds ``|x_k(T) - x_k*|``, of vehicles theirs, by one proof after the other: (N,) arrays.
+
+        Agents move continuously: what bounds all from ``T`` on does so at ``T``, too.
+        """
+        if self.vehicles is None and self.direct:
             return [np.zeros(len(self.labels))]
-        found = [self.residual, None if self.settling is None else self.settling.residual]
-        whole = (np.array([float_up(x) for x in one.residual]) for one in (self.form, self.lmi) if one is not None)
-        return [*(one for one in found if one is not None), *whole]
+        own = [self.residual, None if self.settling is None else self.settling.residual]
+        own += [np.array([float_up(x) for x in one.residual]) for one in (self.form, self.lmi) if one is not None]
+        found = [one for one in own if one is not None] if self.vehicles is None else [self.vehicles.position]
+        return found if self.after is None else [*found, np.full(len(self.labels), self.after)]
 
     @property
     def largest(self) -> float:
@@ -222,7 +224,7 @@ class LateBounds:
         """Whether deadlines of stages fail since information takes longer than ``T`` to come from leaders to all."""
         return self.staged == ()
 
-    @property
+    @cached_property
     def after(self) -> float | None:
         """What bounds ``|x_k - x_k*|`` from ``T`` on where leaders move; None where they rest."""
         if self.leaders is None or (self.vehicles is not None and not self.rows):

@@ -246,19 +246,23 @@ class Influence:
         return shares / total if total else shares
 
     def to_csv(self) -> str:
-        """Return the weights that are not 0 as CSV ``node,leader,weight``, as exact as they are known.
+        """Return the weights that are not 0 as CSV ``node,leader,weight``, in floats, as spreadsheets take them.
+
+        :meth:`row` has them as exact as they are known.
 
         Examples
         --------
         >>> print(influence([("a", "c", 1), ("b", "c", -3)]).to_csv(), end="")
         node,leader,weight
-        a,a,1
-        c,a,1/4
-        c,b,-3/4
-        b,b,1
+        a,a,1.0
+        c,a,0.25
+        c,b,-0.75
+        b,b,1.0
         """
         labels, text = self.structure.graph.labels, io.StringIO()
-        rows = ((label, labels[j], weight) for k, label in enumerate(labels) for j, weight in self.row(k).items())
+        rows = (
+            (label, labels[j], float(weight)) for k, label in enumerate(labels) for j, weight in self.row(k).items()
+        )
         csv.writer(text, lineterminator="\n").writerows([("node", "leader", "weight"), *rows])
         return text.getvalue()
 

@@ -25,7 +25,7 @@ from ptcc_certify.graphs.io.signs import interval_columns, is_sign, weight_and_s
 from ptcc_certify.graphs.io.table_columns import BY_HEADER, RATERS, Columns, columns_of, edge_columns
 from ptcc_certify.graphs.labels import first_five, labels_beside, refuse_written_twice
 from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.graphs.reading import Reading
+from ptcc_certify.graphs.reading import Reading, joined
 
 TAKEN = (
     "a SignedDigraph, a path, the name of a packaged graph, a networkx.DiGraph, an adjacency matrix with orientation=, "
@@ -149,9 +149,10 @@ def _rows_of_table(table: Any, how: Reading) -> Rows | None:
     named = bool(how.titles) or edge_columns(names, "the DataFrame") is not None
     columns = columns_of(names, [], "the DataFrame", how) if named else Columns()
     if not columns.titles and not columns.told:
+        own = joined(names[:3]) if len(names) > 2 else "a,b,w"
         raise GraphError(
             f"a DataFrame with the columns {first_five(names)} is no graph; name them source, target, weight, tell "
-            'them: columns="a,b,w", or give an adjacency matrix with the same labels on rows and columns'
+            f'them: columns="{shorten(own)}", or give an adjacency matrix with the same labels on rows and columns'
         )
     how.refuse("variable", "the DataFrame", "a table of edges")
     if not columns.titles:

@@ -14,7 +14,7 @@ from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes
 from ptcc_certify.graphs.io.problems import Problem, Problems, one_message
 from ptcc_certify.graphs.io.signs import find, interval_columns, weight_and_sign
 from ptcc_certify.graphs.io.table_columns import columns_of, edge_columns
-from ptcc_certify.graphs.rationals import parse_exact, shorten
+from ptcc_certify.graphs.rationals import decimal_mend, parse_exact, shorten
 from ptcc_certify.graphs.reading import Reading
 
 
@@ -84,7 +84,7 @@ def read_delays(path: Source, graph: SignedDigraph | Family, title: str = "delay
         if value is None or value < 0:
             what, quote = ("negative", "") if value is not None else ("not a number", '"')
             said = f"delay {quote}{shorten(text)}{quote} of edge {shorten(source)} -> {shorten(target)} is {what}"
-            mend = "write decimals with a point" if value is None and "," in text else "give a number >= 0"
+            mend = decimal_mend(text if value is None else "", "give a number >= 0")
             broken.add(Problem(f"line {number}", said, mend), what)
             continue
         if not source or not target:

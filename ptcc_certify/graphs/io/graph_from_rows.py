@@ -18,7 +18,7 @@ from ptcc_certify.graphs.io.raw_edges import DECIMALS, HEADER_MEND, Rows, Signs
 from ptcc_certify.graphs.io.signs import DIRECTIONS, NO_SIGN, code_among, sign_of_word
 from ptcc_certify.graphs.labels import in_all, ordered_labels, refuse_written_twice
 from ptcc_certify.graphs.packed_weights import LARGEST_WEIGHT, SMALLEST_WEIGHT, Weights
-from ptcc_certify.graphs.rationals import MINUS, as_fraction, nearest_float, parse_exact, shorten
+from ptcc_certify.graphs.rationals import MINUS, as_fraction, decimal_mend, nearest_float, parse_exact, shorten
 from ptcc_certify.graphs.reading import Reading
 
 #: Numbers of a type without signs that are nearer to its largest than this were negative.
@@ -230,7 +230,7 @@ class _Draft:
     def mend_of_text(self, text: str, message: str, code: int) -> str:
         """Tell how a text is mended that is no number."""
         if "," in text:
-            return "write decimals with a point"
+            return decimal_mend(text)
         if sign_of_word(text) is not None:
             return "write 1 or -1, as in the other rows"
         if text.startswith("{"):

@@ -175,9 +175,7 @@ def read_state(
     except csv.Error as error:
         raise ParameterError(place, f"unclear quotes ({error}); close each") from None
     bare, labelled = text_or_path.strip(), any("=" in item for item in items)
-    if re.fullmatch(r"\[.*\]|\(.*\)|\{.*\}", bare) or (
-        len(items) == 1 < graph.n_nodes and re.search(r"[;\s]", bare) and bare.partition("=")[0] not in graph.index
-    ):
+    if re.fullmatch(r"\[.*\]|\(.*\)|\{.*\}", bare) or _separated_otherwise(bare, items, graph):
         mend = "separate the values by commas, without brackets, such as 5,2,-4 or a=5,b=2,c=-4"
         raise ParameterError(place, f"no such file; {mend}")
     if labelled:
@@ -194,6 +192,16 @@ def read_state(
         size = f"{counted(len(items), 'value')} for {counted(graph.n_nodes, 'node')}"
         raise ParameterError(place, f"no such file, and {size}; give one for each of {first_five(graph.labels)}")
     return _in_node_order([(*pair, place) for pair in pairs], graph, place, ParameterError)
+
+
+def _separated_otherwise(text: str, items: Sequence[str], graph: SignedDigraph) -> bool:
+    """Tell whether values seem to be separated by blanks or semicolons, or labels from values by colons."""
+    if ";" in text and not any(";" in label for label in graph.labels):
+        return True
+    if "=" not in text and (ends := [item.partition(":")[0].strip() for item in items if ":" in item]):
+        return all(label in graph.index for label in ends)
+    several = text.count("=") > 1 or text.partition("=")[0] not in graph.index
+    return len(items) == 1 < graph.n_nodes and re.search(r"[;\s]", text) is not None and several
 
 
 def in_node_order(values: Any, graph: SignedDigraph, name: str = "x0") -> Any:

@@ -12,7 +12,7 @@ from ptcc_certify.graphs.io.files import decoded
 from ptcc_certify.graphs.io.laplacian_or_adjacency import diagonal_of
 from ptcc_certify.graphs.io.raw_edges import Rows, rows_of
 from ptcc_certify.graphs.io.signs import sign_of_word
-from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.rationals import decimal_mend, shorten
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*([eE][+-]?\d+)?|\.\d+([eE][+-]?\d+)?|\d+/\d+|nan|inf(inity)?)", re.IGNORECASE)
 _ZERO = re.compile(r"[+-]?(0+\.?0*|\.0+)([eE][+-]?\d+)?")
@@ -137,9 +137,8 @@ def _labelled(labels: list[str], columns: list[str], entries: list[list[str]], n
             return None
         k, m = odd[0]
         text = entries[k][m]
-        mend = "write decimals with a point" if "," in text else "give a number"
         place = f"row {shorten(labels[k])}, column {shorten(columns[m])} of the matrix"
-        raise FormatError(f'{name}: {place}: "{shorten(text)}" is not a number; {mend}')
+        raise FormatError(f'{name}: {place}: "{shorten(text)}" is not a number; {decimal_mend(text)}')
     order = [columns.index(label) for label in labels]
     return _told(labels, [[line[k] for k in order] for line in entries])
 

@@ -95,6 +95,7 @@ def leader_facts(structure: Structure) -> Facts:
     if followers := [labelled(structure.graph.labels[v]) for v in structure.followers.tolist()]:
         brief = shorten_list(followers, TEXT)
         yield Fact(head="followers", note=shorten_list(followers, _LONG_LIST), brief=(brief,))
+        yield from _camps_of_all(structure)
 
 
 def family_text(family: Family, name: str) -> str:
@@ -199,15 +200,33 @@ def leaders_text(component: ClosedComponent, labels: Sequence[str], width: int =
         more = ", ..." if len(component.negative_cycle) > 12 else ""
         return f"{shorten_list(nodes, 2 * width)}: unbalanced, negative cycle {steps}{more}"
     sides = camps(component)
-    text = " against ".join("{" + shorten_list([labelled(labels[v]) for v in camp], width) + "}" for camp in sides)
-    return f"balanced, {'camps ' if len(sides) > 1 else 'one camp '}{text}"
+    return f"balanced, {'camps ' if len(sides) > 1 else 'one camp '}{_against(sides, labels, width)}"
 
 
 def camps(component: ClosedComponent) -> list[list[int]]:
     """Return the camps of a balanced leader group, the one of its first node first."""
-    gauge = component.gauge or ()
-    both = ([v for v, g in zip(component.nodes, gauge, strict=True) if g == sign] for sign in (1, -1))
+    return _sides(component.nodes, component.gauge or ())
+
+
+def _sides(nodes: Sequence[int], gauge: Sequence[int]) -> list[list[int]]:
+    """Split nodes by their signs, those that have +1 first."""
+    both = ([v for v, g in zip(nodes, gauge, strict=True) if g == sign] for sign in (1, -1))
     return [camp for camp in both if camp]
+
+
+def _camps_of_all(structure: Structure) -> Facts:
+    """Tell the two camps of a connected graph that is balanced as a whole, followers among them."""
+    if structure.gauge is None or len(structure.components) > 1:
+        return
+    sides = _sides(range(structure.graph.n_nodes), structure.gauge.tolist())
+    if len(sides) > 1:
+        long, short = (_against(sides, structure.graph.labels, width) for width in (_LONG_LIST, TEXT // 2 - 6))
+        yield Fact(head="camps", note=f"of all {long}", brief=(f"of all {short}",))
+
+
+def _against(sides: Sequence[Sequence[int]], labels: Sequence[str], width: int) -> str:
+    """Write camps against each other."""
+    return " against ".join("{" + shorten_list([labelled(labels[v]) for v in camp], width) + "}" for camp in sides)
 
 
 def structure_text(structure: Structure) -> str:

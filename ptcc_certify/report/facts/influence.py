@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ptcc_certify.certificate.fact import Fact, Facts
 from ptcc_certify.errors import labelled
-from ptcc_certify.report.text_layout import agent_text, printable, shorten_list
+from ptcc_certify.report.text_layout import agent_text, columns, shorten_list
 
 if TYPE_CHECKING:
     from ptcc_certify.bounds.final_state.of_graph import Influence
 
 #: Nodes above which sums are told without each node's row.
 _ROWS = 60
-#: Columns of a list on a short screen.
-_SHORT = 140
+#: Columns of a list on a short screen, and of the names and of the sum of one entry of it.
+_SHORT, _NAMES, _TERMS = 140, 40, 75
 
 
 def influence_facts(who: Influence) -> Facts:
@@ -44,22 +44,33 @@ def influence_facts(who: Influence) -> Facts:
     yield Fact(head="decides", value={labels[j]: float(shares[j]) for j in order}, note=shorten_list(texts, _SHORT))
     if len(labels) > _ROWS:
         return
-    groups: dict[tuple[tuple[int, object], ...], list[str]] = defaultdict(list)
+    groups: dict[tuple[tuple[int, Any], ...], list[str]] = defaultdict(list)
     for k, label in enumerate(labels):
         groups[tuple(who.row(k).items())].append(labelled(agent_text(label)))
     told: list[str] = []
+    brief: list[str] = []
     for row, names in groups.items():
         verb = "" if told else "end " if len(names) > 1 else "ends "
-        told.append(f"{', '.join(names)} {verb}at {_sum(dict(row), labels)}")
-    yield Fact(head="x(T)", note=", ".join(told), brief=(shorten_list(told, _SHORT),))
+        told.append(f"{', '.join(names)} {verb}at {_sum(_terms(row, labels))}")
+        largest_first = sorted(row, key=lambda term: -abs(term[1]))
+        brief.append(f"{shorten_list(names, _NAMES)} {verb}at {_sum(_terms(largest_first, labels, 16), _TERMS)}")
+    yield Fact(head="x(T)", note=", ".join(told), brief=(shorten_list(brief, _SHORT),))
 
 
-def _sum(row: dict[int, Any], labels: Sequence[str]) -> str:
-    """Write a weighted sum of initial states, rounded; 0 where there is none."""
-    text = ""
-    for j, weight in row.items():
-        number, name = f"{abs(float(weight)):.3g}", f"x_{labelled(printable(labels[j]))}"
-        sign = "-" if weight < 0 else "+"
-        term = name if number == "1" else f"{number} {name}"
-        text += f" {sign} {term}" if text else (f"-{term}" if sign == "-" else term)
-    return text or "0"
+def _terms(row: Iterable[tuple[int, Any]], labels: Sequence[str], width: int = 1000) -> list[str]:
+    """Write the terms of a weighted sum of initial states, each with its sign, rounded, labels shortened."""
+    sizes = [
+        ("-" if weight < 0 else "+", f"{abs(float(weight)):.3g}", agent_text(labels[j], width)) for j, weight in row
+    ]
+    return [f"{sign} {'' if size == '1' else f'{size} '}x_{name}" for sign, size, name in sizes]
+
+
+def _sum(terms: Sequence[str], width: int = 0) -> str:
+    """Write a sum, 0 where it has no terms; of one that is wider, the first terms and how many there are."""
+    text = " ".join(terms).removeprefix("+ ")
+    text = "-" + text[2:] if text.startswith("- ") else text or "0"
+    if not width or columns(text) <= width:
+        return text
+    ending = f" + ... ({len(terms)} terms)"
+    fitting = next(n for n in range(len(terms) - 1, 0, -1) if n == 1 or columns(_sum(terms[:n]) + ending) <= width)
+    return _sum(terms[:fitting]) + ending

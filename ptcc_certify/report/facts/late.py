@@ -244,16 +244,12 @@ def _left(late: LateBounds) -> Facts:
 
 
 def _within_text(late: LateBounds, digits: int) -> str:
-    """Tell how far agents are from their final states at T at most, or from the targets that leaders move.
-
-    Agents move continuously: a bound that holds after T holds at T, too.
-    """
+    """Tell how far agents are from their final states at T at most, or from the targets that leaders move."""
     if not late.largest:
         return f"every {'agent exactly at its final state' if late.leaders is None else 'follower on its target'} at T"
     text = f"every agent within {up(late.largest, digits)} of {late.goal} at T"
     if late.leaders is not None and not late.forms:
-        at_deadline = late.largest if late.after is None else min(late.largest, late.after)
-        text = f"every follower within {up(at_deadline, digits)} of its target at T"
+        text = f"every follower within {up(late.largest, digits)} of its target at T"
         text += "" if late.after is None else f", within {up(late.after, digits)} from then on"
     text += FROM_WITHIN_1 if late.relative else ""
     return text + ("; leaders hear each other at once, and settle by themselves" if late.settling is not None else "")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -29,6 +29,9 @@ from ptcc_certify.report.facts.states import family_final_facts, final_facts, in
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
+
+#: How the line ends that tells what is given.
+_FOLLOWS = ", in what follows"
 
 
 def facts_of(
@@ -88,11 +91,11 @@ def _answers(certificate: Certificate, origins: Mapping[str, str], details: bool
     else:
         yield from claim_facts(certificate)
     yield from beside
-    yield from (_of_family if certificate.of_family else _of_graph)(certificate, details, bool(beside))
+    yield from (_of_family if certificate.of_family else _of_graph)(certificate, details, beside)
 
 
-def _of_graph(certificate: Certificate, details: bool, beside: bool) -> Facts:
-    """Tell of one graph where its agents end, how fast, and with what input; ``beside`` if more is told before."""
+def _of_graph(certificate: Certificate, details: bool, beside: Sequence[Fact]) -> Facts:
+    """Tell of one graph where its agents end, how fast, and with what input; ``beside`` what is given there."""
     drawn = certificate.only_drawn
     if certificate.proof.agents is not None:
         yield from agents_facts(certificate.proof.agents, details)
@@ -103,22 +106,22 @@ def _of_graph(certificate: Certificate, details: bool, beside: bool) -> Facts:
         of = "" if part is None else "of the plain protocol: " if part.order == 1 else "of single integrators: "
         yield from (replace(fact, note=joined("", (of, fact.note))) for fact in rate_facts(certificate))
     if certificate.proof.agents is None and (details or not beside):
-        yield from _details(error_facts(certificate, drawn, details), beside)
-        yield from _details(input_facts(certificate, details), beside)
-        yield from _details(disturbed_facts(certificate), beside)
+        yield from _details(error_facts(certificate, drawn, details), bool(beside))
+        yield from _given(input_facts(certificate, details), beside)
+        yield from _details(disturbed_facts(certificate), bool(beside))
     if details:
         yield from run_facts(certificate)
 
 
-def _of_family(certificate: Certificate, details: bool, beside: bool) -> Facts:
+def _of_family(certificate: Certificate, details: bool, beside: Sequence[Fact]) -> Facts:
     """Tell the same of a family for every signal, and for those that were asked for."""
     yield from family_rate_facts(certificate)
     if details:
         yield from function_facts(certificate)
     yield from signal_facts(certificate)
     yield from _details(family_final_facts(certificate), certificate.proof.leaders_move)
-    yield from _details(family_error_facts(certificate), beside)
-    yield from _details(family_input_facts(certificate), beside)
+    yield from _details(family_error_facts(certificate), bool(beside))
+    yield from _given(family_input_facts(certificate), beside)
 
 
 def _beside(certificate: Certificate) -> list[Fact]:
@@ -126,10 +129,17 @@ def _beside(certificate: Certificate) -> list[Fact]:
     if certificate.proof.late is None and not certificate.proof.leaders_move:
         return []  # facts that are without limits, noise or disturbances say so
     without = [text for text in assumptions(certificate) if not text.startswith("without limits")]
-    text = f"{', '.join(without)}, in what follows"
+    text = f"{', '.join(without)}{_FOLLOWS}"
     return [Fact(head="given", note=text, detail=True)] if without else []
 
 
 def _details(facts: Iterable[Fact], are: bool) -> Iterable[Fact]:
     """Return facts, which are details where others stand in their place."""
     return (replace(fact, detail=True) for fact in facts) if are else facts
+
+
+def _given(facts: Iterable[Fact], beside: Sequence[Fact]) -> Facts:
+    """Return facts of the input as details that say what is given; as they are where nothing is."""
+    first = "".join(f"{fact.text.removesuffix(_FOLLOWS)}: " for fact in beside)
+    for fact in _details(facts, bool(beside)):
+        yield replace(fact, note=joined("", (first, fact.note)), brief=()) if first and fact.head == "input" else fact
