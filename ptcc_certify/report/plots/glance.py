@@ -368,7 +368,8 @@ def _draw_error(ax: Axes, certificate: Certificate, time_unit: str) -> None:
 def joined_above(t: np.ndarray, bound: np.ndarray, longest: float) -> np.ndarray:
     """Return what lies on a bound, (M,), or above it, and joins the corners of its steps that are not the longest.
 
-    Between instants, too, it is not below a bound that falls, or rises, from the one to the other.
+    Between instants, too, it is not below a bound that falls, or rises, from the one to the other. A bound that does not
+    go by steps, equal at most instants to that before, is returned as it is.
 
     Examples
     --------
@@ -377,7 +378,7 @@ def joined_above(t: np.ndarray, bound: np.ndarray, longest: float) -> np.ndarray
     array([4. , 4. , 4. , 4. , 3.5, 3. , 2.5, 2. ])
     """
     known = np.flatnonzero(np.isfinite(bound))
-    if known.size < 2:
+    if 2 * np.count_nonzero(np.diff(bound[known]) == 0) < known.size:
         return bound
     wide, times = bound[known], t[known]
     wide = np.maximum.reduce([wide, np.append(wide[:1], wide[:-1]), np.append(wide[1:], wide[-1:])])
