@@ -208,7 +208,7 @@ def name_agents(
     """Write the names of agents where their lines begin, and where they end if they end apart; show time ``until``.
 
     If values are ``told``, (N,), they stand beside the names at the ends, with those of all others who end there; a
-    point marks at ``T`` where a line has not arrived. Names take so much room only that the time up to ``T`` keeps half
+    point marks at ``T`` where a line has not arrived. Names take so much room only that the time up to ``T`` keeps 55 %
     of the width: longer ones have two lines, or stand at the beginning alone. Where nothing changes after ``T``, little
     of that is shown unless told.
 
@@ -254,6 +254,22 @@ def name_agents(
         if len(letters) > 1 and told is None and min(letters) < max(longest / 2, min(longest, SHORT)):
             letters = [max(3, int((room - NAME_GAP) / WIDER / text_width("x")))]
         texts = columns_of(letters)
+    _write_names(ax, texts, (first, last))
+    rooms = [NAME_GAP + WIDER * max(text_width(name) for _, _, name, _ in column) for column in texts]
+    own = max(wide - rooms[0] - inside * sum(rooms[1:]), wide / 3)
+    left = (last - first) * rooms[0] / own
+    ticks = MaxNLocator(min(tick_count(ax.xaxis, 5), max(2, int(own / TICK_ROOM))), steps=STEPS).tick_values(
+        first, last
+    )
+    ax.set_xticks([x for x in ticks if first <= x <= last])
+    ax.set_xlim(first - left, last)
+    ax.spines["bottom"].set_bounds(first, last)  # names have their room before time begins
+
+
+def _write_names(
+    ax: Axes, texts: Sequence[Sequence[tuple[float, float, str, str]]], times: tuple[float, float]
+) -> None:
+    """Write the columns of names: at the left of the first time those that begin, at the right of the last the others."""
     for side, column in zip((-1, 1), texts, strict=False):
         for height, place, name, colour in column:
             line = {"arrowstyle": "-", "color": colour, "linewidth": 0.4, "shrinkA": 0, "shrinkB": 0, "clip_on": False}
@@ -264,17 +280,8 @@ def name_agents(
             style |= {"va": "center" if "\n" in name else "center_baseline"}
             style |= {"fontsize": NAME_SIZE, "parse_math": False, "annotation_clip": False, "arrowprops": line}
             style["path_effects"] = HALO
-            start, moved = ((first, last)[side > 0], height), (side * 8, place)
+            start, moved = (times[side > 0], height), (side * 8, place)
             ax.annotate(name, start, moved, textcoords=("offset points", "data"), **style)
-    rooms = [NAME_GAP + WIDER * max(text_width(name) for _, _, name, _ in column) for column in texts]
-    own = max(wide - rooms[0] - inside * sum(rooms[1:]), wide / 3)
-    left = (last - first) * rooms[0] / own
-    ticks = MaxNLocator(min(tick_count(ax.xaxis, 5), max(2, int(own / TICK_ROOM))), steps=STEPS).tick_values(
-        first, last
-    )
-    ax.set_xticks([x for x in ticks if first <= x <= last])
-    ax.set_xlim(first - left, last)
-    ax.spines["bottom"].set_bounds(first, last)  # names have their room before time begins
 
 
 def share_times(named: Sequence[Axes], every: Sequence[Axes], rows: int) -> None:
