@@ -269,7 +269,7 @@ def name_agents(
 def _write_names(
     ax: Axes, texts: Sequence[Sequence[tuple[float, float, str, str]]], times: tuple[float, float]
 ) -> None:
-    """Write the columns of names: at the left of the first time those that begin, at the right of the last the others."""
+    """Write the columns of names: at the left of the first time, and at the right of the last."""
     for side, column in zip((-1, 1), texts, strict=False):
         for height, place, name, colour in column:
             line = {"arrowstyle": "-", "color": colour, "linewidth": 0.4, "shrinkA": 0, "shrinkB": 0, "clip_on": False}

@@ -368,8 +368,8 @@ def _draw_error(ax: Axes, certificate: Certificate, time_unit: str) -> None:
 def joined_above(t: np.ndarray, bound: np.ndarray, longest: float) -> np.ndarray:
     """Return what lies on a bound, (M,), or above it, and joins the corners of its steps that are not the longest.
 
-    Between instants, too, it is not below a bound that falls, or rises, from the one to the other. A bound that does not
-    go by steps, equal at most instants to that before, is returned as it is.
+    Between instants, too, it is not below a bound that falls, or rises, from the one to the other. A bound that
+    does not go by steps, equal at most instants to that before, is returned as it is.
 
     Examples
     --------
