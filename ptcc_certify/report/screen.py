@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ptcc_certify.checker import CheckReport
 
 #: Titles on a long screen, each before facts of these heads; those of others stay where they are.
-_SECTIONS = {
+SECTIONS = {
     "What is asked": ("graph", "family"),
     "Who leads, what is heard": ("messages", "leaders"),
     "Where they end": ("claim",),
@@ -64,7 +64,7 @@ def long_screen(facts: Iterable[Fact], name: Spelling = str) -> list[str]:
     """
     lines, title = [], ""
     for head, text in entries(facts, name):
-        section = next((section for section, heads in _SECTIONS.items() if head.lower() in heads), title)
+        section = next((section for section, heads in SECTIONS.items() if head.lower() in heads), title)
         if section != title and not (title == _WHOLE and section in ("How near, by when", "What it takes")):
             lines += ["", section]
             title = section
