@@ -410,9 +410,10 @@ def _draw_run(ax: Axes, certificate: Certificate, run: Any, ends: np.ndarray, ti
             ax.plot(run.t[until], values[k][until], color=colour, linewidth=width, gid=node_id(k, "run"))
             if tube is not None and np.isfinite(tube.low[k]).any():
                 shade: dict[str, Any] = {"alpha": _SHADE / max(5, len(values)), "linewidth": 0}
-                middle, half = (tube.high[k] + tube.low[k]) / 2, (tube.high[k] - tube.low[k]) / 2
-                half = joined_above(run.t, half, _FLAT * T)
-                ax.fill_between(run.t[until], (middle - half)[until], (middle + half)[until], color=colour, **shade)
+                half = (tube.high[k] - tube.low[k]) / 2
+                wider = np.subtract(joined_above(run.t, half, _FLAT * T), half, where=np.isfinite(half), out=0 * run.t)
+                low, high = tube.low[k] - wider, tube.high[k] + wider
+                ax.fill_between(run.t[until], low[until], high[until], color=colour, **shade)
         named = dict(enumerate(colours))
         if len(values) > _EACH:
             group = camp_groups(structure)
