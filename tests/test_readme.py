@@ -52,7 +52,7 @@ def test_the_batch_runs(folder: Path):
 
 def test_there_are_commands():
     """Every command of ``ptcc`` is shown, and run above."""
-    shown = {line.split()[1] for line in SESSIONS[-1].splitlines() if line.startswith("ptcc ")}
+    shown = {line.split()[1] for text in SESSIONS for line in text.splitlines() if line.startswith("ptcc ")}
     assert shown == set(cli.commands)
 
 

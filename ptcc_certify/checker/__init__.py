@@ -14,7 +14,9 @@ structure, final state, Lyapunov functions and upper bounds on rates are verifie
 from __future__ import annotations
 
 import io
+import json
 import math
+import re
 import sys
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -255,7 +257,8 @@ def stated(data: Mapping[str, Any]) -> list[str]:
     problem = data["problem"]
     nodes, gain = problem["graph"]["nodes"], dict(problem["gain"])
     gain.pop("disturbance", None)
-    numbers = ", ".join(f"{key}={shorten(value)}" for key, value in gain.items() if key != "kind")
+    texts = ((key, _number(value)) for key, value in gain.items() if key != "kind")
+    numbers = ", ".join(f"{key}={text[3:]}" if text.startswith("at ") else f"{key} {text}" for key, text in texts)
     signal = f", signal {problem['signal']}" if "signal" in problem else ""
     lines = [f"protocol   {gain['kind']}: {numbers}; {counted(len(nodes), 'node')}{signal}"]
     if "claim" in data:
@@ -266,7 +269,7 @@ def stated(data: Mapping[str, Any]) -> list[str]:
         told = dict.fromkeys(part["claim"]["behaviour"] for part in parts)
         lines.append(f"claim      {', '.join(told)}, component by component ({len(parts)})")
     ends = {} if beside(data.get("final_state")) else data.get("final_state", {})
-    known = [f"{shorten(node)} {_end(ends[node])}" for node in nodes[:STATED] if ends.get(node)]
+    known = [f"{_quoted(node)} {_number(ends[node])}" for node in nodes[:STATED] if ends.get(node)]
     if known:
         lines.append(f"x(T)       {', '.join(known)}{', ..' if len(nodes) > STATED else ''}")
     without = [key for key in ("agents", "messages", "formation", "restricted") if key in data]
@@ -274,11 +277,17 @@ def stated(data: Mapping[str, Any]) -> list[str]:
     return [*lines, f"beside     {', '.join(without)}: claim and x(T) are without these"] if without else lines
 
 
-def _end(end: str | Mapping[str, str]) -> str:
-    """Tell a final state as it is stated if that is short, else rounded outwards."""
-    if isinstance(end, str) and len(end) <= 12:
-        return f"at {end}"
-    mid, radius = (exact(end), 0) if isinstance(end, str) else (exact(end["mid"]), exact(end["radius"]))
+def _quoted(label: str) -> str:
+    """Return a label, in quotes where a reader could take it for more than that, and cut before its end."""
+    cut = label if len(label) <= 40 else f"{label[:18]}...{label[-18:]}"
+    return cut if re.fullmatch(r"[\w.+-]+", cut) else json.dumps(shorten(cut, 60), ensure_ascii=False)
+
+
+def _number(number: str | Mapping[str, str]) -> str:
+    """Tell a number as it is stated if that is short, else, and an interval always, rounded outwards."""
+    if isinstance(number, str) and len(number) <= 12:
+        return f"at {number}"
+    mid, radius = (exact(number), 0) if isinstance(number, str) else (exact(number["mid"]), exact(number["radius"]))
     return f"in [{down(mid - radius)}, {up(mid + radius)}]"
 
 

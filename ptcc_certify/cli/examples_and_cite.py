@@ -128,11 +128,13 @@ def cite(theorem: tuple[str, ...]) -> int:
 
     words = " ".join(theorem)
     named = re.sub(r"(?i)^theorem\s*", "", words)
-    if named == "software":
+    if named.lower() == "software":
         click.echo(cite_software())
         return ExitCode.OK
     from ptcc_certify.certificate.certificate_file import RejectedCertificate
 
+    if len(theorem) > 1 + (theorem[0].lower() == "theorem"):
+        raise ParameterError("cite one theorem, or one certificate, at a time")
     try:
         applied = _theorems_of(words) if Path(words).suffix.lower() == ".json" else [named] * bool(named)
     except RejectedCertificate as error:

@@ -144,7 +144,7 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
 
 
 def _of_certificate(graph: tuple[str, ...], output: str | None, samples: int, look: dict[str, Any]) -> int:
-    """Write the run of what a certificate is about, which is checked first."""
+    """Write the run of what a certificate is about, which is checked first, at as many instants as that of a graph."""
     from ptcc_certify.certificate.certificate import read_certificate
     from ptcc_certify.certificate.certificate_file import RejectedCertificate
 
@@ -160,6 +160,9 @@ def _of_certificate(graph: tuple[str, ...], output: str | None, samples: int, lo
                 raise ParameterError(f"{graph[0]}: is of a family, which has a run for every signal; {mend}")
             begin("simulation")
             part = certificate.proof.agents
+            if part is None and (certificate.initial_state is None or certificate.only_drawn):
+                mend = "simulate its graph, with --x0"
+                raise ParameterError(f"{graph[0]}: is of no single initial state; {mend}")
             own = certificate.asked_trajectory if part is None else part.simulate(samples=samples)
             run = own or certificate.simulate(samples=samples)
     except RejectedCertificate as error:
@@ -167,7 +170,7 @@ def _of_certificate(graph: tuple[str, ...], output: str | None, samples: int, lo
         return ExitCode.VIOLATED
     _write(run, output, "trajectory.plot_run" if part is None else "motion.plot_motion", look)
     if own is None and (certificate.proof.late is not None or certificate.limits):
-        click.echo("note: the run is of the protocol alone, without limits, and nothing late", err=True)
+        click.echo("note: the run is of the protocol alone: without limits, nothing late, leaders at rest", err=True)
     return ExitCode.OK
 
 

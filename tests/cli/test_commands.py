@@ -387,3 +387,5 @@ def test_a_certificate_is_run_as_its_graph_is(tmp_path: Path):
     assert ptcc("simulate", "c.json").code == 1
     ptcc("certify", "team.csv", "--uncertainty", "1%", "--no-simulation", "-o", "f.json")
     assert "--switching" in ptcc("simulate", "f.json").err
+    ptcc("certify", "team.csv", "--initial-bound", "2", "--no-simulation", "-o", "set.json")
+    assert "is of no single initial state" in ptcc("simulate", "set.json").err

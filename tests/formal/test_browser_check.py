@@ -6,6 +6,7 @@ import json
 import random
 import re
 import subprocess
+from fractions import Fraction
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,8 @@ from mutations import mutants, resealed
 from side_files import with_side_files
 from verified import program
 
-from ptcc_certify import checker
+from ptcc_certify import Asks, NominalProtocol, certify, checker
+from ptcc_certify.checker.reading import exact
 
 FORMAL = Path(__file__).resolve().parents[2] / "formal"
 PAGE = FORMAL / "browser" / "check.html"
@@ -185,10 +187,37 @@ def test_the_page_tells_what_a_certificate_states_as_the_checker_in_python_does(
         own = checker.stated(json.loads(Path(path).read_text(encoding="utf-8")))
         assert 2 <= len(lines) <= 4
         for line, other in zip(lines, own, strict=True):
-            rounded = " about " in line or " within " in line
+            rounded = " in [" in line
             assert line[:11] == other[:11] and (rounded or line == other), path
+            assert not rounded or line[:1] != "x" or _holds(line, path), path
             kinds.add((line.split()[0], rounded))
     assert kinds == {("protocol", False), ("claim", False), ("x(T)", False), ("x(T)", True), ("beside", False)}
+
+
+def _holds(line: str, path: str) -> bool:
+    """Tell whether every interval of a line holds the final state of the file."""
+    ends = json.loads(Path(path).read_text(encoding="utf-8"))["final_state"]
+    told = re.findall(r"(\w+) in \[([-0-9.]+), ([-0-9.]+)\]", line)
+    for label, low, high in told:
+        end = ends[label]
+        mid, radius = (exact(end), 0) if isinstance(end, str) else (exact(end["mid"]), exact(end["radius"]))
+        if not Fraction(low) <= mid - radius <= mid + radius <= Fraction(high):
+            return False
+        if Fraction(high) - Fraction(low) - 2 * radius > Fraction(2, 10**6):
+            return False
+    return bool(told)
+
+
+@pytest.mark.parametrize("node", ["constructor", "eve at 0, ann", "a\nclaim      stability", "\u202eb", "x" * 50])
+def test_a_label_is_no_statement_of_the_page(node: str, tmp_path: Path) -> None:
+    cert = certify([(node, "b", -1)], NominalProtocol(T="1." + "0" * 30 + "1", rho1=1), asks=Asks(simulation=False))
+    other = certify([(node, "b", -1)], NominalProtocol(T=2, rho1=1), [3, 1], asks=Asks(simulation=False))
+    for data in (cert.to_dict(), other.to_dict()):
+        (lines,) = of_page(f"[{json.dumps(data)}].map(stated)", tmp_path)
+        own = checker.stated(data)
+        assert all("\n" not in line and line.isprintable() for line in (*lines, *own))
+        assert lines[1:] == own[1:] and lines[0].startswith("protocol   nominal: T")
+    assert "T in [1.000000, 1.000001]" in of_page(f"[{json.dumps(cert.to_dict())}].map(stated)", tmp_path)[0][0]
 
 
 def test_the_page_takes_a_byte_order_mark_and_tells_what_is_no_json(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -238,7 +239,7 @@ def test_colours_and_values_are_of_the_run_where_leaders_move() -> None:
     assert [lines[node_id(k, "run")].get_color() for k in range(len(at_T))] == colours_of(np.array(at_T))
     told = " ".join(text.get_text().replace("\n", " ") for text in ax.texts)
     for x in at_T:
-        assert f": {round(x, 2):.3g}" in told, (x, told)
+        assert f": {x:.3g}" in told, (x, told)
 
 
 @pytest.mark.parametrize("name", ["refuted", "refuted-rate", "family-refuted", "gain-cap"])
@@ -293,3 +294,23 @@ def test_the_caption_says_what_colours_tell(name: str, coloured: bool) -> None:
     page = report_html(read if read.proof.agents is not None else read.with_simulation())
     caption = page.partition('id="figure-glance"')[2].partition("<figcaption>")[2].partition("</figcaption>")[0]
     assert "Who of" in caption and ("Colours tell" in caption) is coloured
+
+
+@pytest.mark.parametrize(
+    ("edges", "x0", "told"),
+    [
+        ([("l", "b", 1), ("m", "c", 1)], {"l": 4, "m": -4, "b": 1000, "c": -4}, {"l, b: 4", "m, c: -4"}),
+        ([("l", "b", 1), ("m", "c", 1)], {"l": "1.24", "m": "1.16", "b": 100, "c": -4}, {"l, b: 1.24", "m, c: 1.16"}),
+        ([("a", "b", 1), ("b", "a", 2)], {"a": 1000, "b": 0}, {"a, b: 333"}),
+        ([("a", "b", 1), ("b", "a", 2)], {"a": 10000, "b": 0}, {"a, b: 3333"}),
+    ],
+)
+def test_ends_are_told_to_three_digits_of_their_own(edges: list[Any], x0: dict[str, Any], told: set[str]) -> None:
+    figure = plot_glance(ptcc.certify(edges, ptcc.NominalProtocol(T=1, rho1=1, rho2=3, kappa=2), x0))
+    assert {text.get_text() for text in figure.axes[1].texts if ": " in text.get_text()} == told
+
+
+def test_steps_are_joined_beside_what_has_no_limit() -> None:
+    bound = np.repeat([4.0, np.inf, 2.0, 1.0], 10)
+    joined = joined_above(np.arange(40.0), bound, 100)
+    assert joined.shape == bound.shape and (joined >= bound).all() and np.isinf(joined[10:20]).all()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
@@ -221,8 +220,7 @@ def name_agents(
     enders, enders_colours, tails, early = agents, colours, [""] * len(agents), np.zeros(len(values), dtype=bool)
     at_end = values[:, np.searchsorted(run.t, last * (1 + 1e-12), side="right") - 1]
     if told is not None:
-        digits = 2 - math.floor(math.log10(float(np.abs(np.nan_to_num(values)).max()) or 1.0))  # a run's 1e-9 is 0
-        tail_of = [f": {round(float(value), digits) + 0.0:.3g}" for value in told]
+        tail_of = [f": {value + 0.0:.{4 if 1e3 <= abs(value) < 1e4 else 3}g}" for value in told.tolist()]
         colour_of = {tail_of[v]: lines[v] for v in reversed(agents)}
         enders = [*agents, *(v for v, tail in enumerate(tail_of) if v not in lines and tail in colour_of)]
         tails = [tail_of[v] for v in enders]

@@ -16,6 +16,8 @@ from ptcc_certify.simulation.trajectory import Trajectory
 ENDS = LinearSegmentedColormap.from_list("ends", ["#A84300", "#6A6A6A", "#005A9C"])
 #: The least final state that has a colour, as a share of the largest first state.
 _SEEN = 1e-3
+#: Below this share of the largest state one of a run is 0.
+_NOISE = 1e-6
 
 
 def final_states(certificate: Certificate, run: Any) -> np.ndarray:
@@ -46,8 +48,9 @@ def final_states(certificate: Certificate, run: Any) -> np.ndarray:
 
 
 def at_deadline(run: Any, values: np.ndarray) -> np.ndarray:
-    """Return what values of a run, (N, M), are at ``T``, (N,)."""
-    return np.array([np.interp(float(run.protocol.gain.T), run.t, own) for own in values])
+    """Return what values of a run, (N, M), are at ``T``, (N,); what an integrator leaves of 0 is 0."""
+    ends = np.array([np.interp(float(run.protocol.gain.T), run.t, own) for own in values])
+    return np.where(np.abs(ends) < _NOISE * np.abs(np.nan_to_num(values)).max(initial=0), 0.0, ends)
 
 
 def colours_of(ends: np.ndarray, largest: float | None = None, first: float = 0) -> list[str]:

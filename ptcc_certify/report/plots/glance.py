@@ -387,7 +387,9 @@ def joined_above(t: np.ndarray, bound: np.ndarray, longest: float) -> np.ndarray
     ends = np.append(change, wide.size - 1)
     flat = times[ends] - times[begins] > longest
     kept = np.unique([0, wide.size - 1, *change[falls], *(change[~falls] + 1), *begins[flat], *ends[flat]])
-    return np.concatenate([bound[: known[0]], np.interp(times, times[kept], wide[kept]), bound[known[-1] + 1 :]])
+    joined = bound.copy()
+    joined[known] = np.interp(times, times[kept], wide[kept])
+    return joined
 
 
 def _draw_run(ax: Axes, certificate: Certificate, run: Any, ends: np.ndarray, time_unit: str) -> None:
