@@ -133,7 +133,7 @@ def cite(theorem: tuple[str, ...]) -> int:
         return ExitCode.OK
     from ptcc_certify.certificate.certificate_file import RejectedCertificate
 
-    if len(theorem) > 1 + (theorem[0].lower() == "theorem"):
+    if len(theorem) > 1 + ([word.lower() for word in theorem[:1]] == ["theorem"]):
         raise ParameterError("cite one theorem, or one certificate, at a time")
     try:
         applied = _theorems_of(words) if Path(words).suffix.lower() == ".json" else [named] * bool(named)

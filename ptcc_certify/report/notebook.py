@@ -66,7 +66,7 @@ def certificate_html(certificate: Certificate) -> str:
     small, figure = certificate.graph_proof.graph.n_nodes <= SHOWN_NODES, None
     with suppress(PTCCError):
         figure = plot_glance(certificate, words=False) if small else None
-    return _page(facts, figure, "who listens to whom, and the run of every agent within its bounds")
+    return _page(facts, figure, "who listens to whom, and the run of every agent within its bounds", brief=True)
 
 
 @html_of.register(Family)
@@ -121,13 +121,13 @@ def _structure_page(facts: Iterable[Fact], structure: Structure) -> str:
     return _page(facts, figure, f"drawing of the graph: {graph.n_nodes} nodes, {leaders}, {graph.n_edges} edges")
 
 
-def _page(facts: Iterable[Fact], figure: Any, alt: str) -> str:
-    """Return facts as a table beside a figure, if there is one."""
+def _page(facts: Iterable[Fact], figure: Any, alt: str, brief: bool = False) -> str:
+    """Return facts as a table beside a figure, if there is one, in the words of the short screen if ``brief``."""
     head = "text-align:left;vertical-align:top;padding-right:0.8em"
     rows = "".join(
         f'<tr><th scope="row" style="{head}">{html.escape(name)}</th>'
         f'<td style="text-align:left">{html.escape(text)}</td></tr>'
-        for name, text in entries(facts)
+        for name, text in entries(facts, brief=brief)
     )
     image = ""
     if figure is not None:

@@ -18,7 +18,6 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.io.files import refuse_no_path
 from ptcc_certify.graphs.size_limits import LABELLED_NODES
-from ptcc_certify.report.plots.camp_lines import HALO
 from ptcc_certify.report.plots.final_colours import colours_of
 from ptcc_certify.report.plots.glance import plot_glance
 from ptcc_certify.report.plots.graph import node_id
@@ -113,8 +112,8 @@ class _Scene:
             self.lines.pop(name).set_visible(False)  # where agents come to be is not shown before they do
         mark: dict[str, Any] = {"markersize": 4.5, "zorder": 6}
         self.dots = {name: ax.plot([], [], "o", color=one.get_color(), **mark)[0] for name, one in self.lines.items()}
-        corner: dict[str, Any] = {"ha": "right", "va": "bottom", "fontsize": 9, "path_effects": HALO, "zorder": 7}
-        self.time = ax.text(0.98, 0.03, "", transform=ax.transAxes, **corner)
+        below: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "right", "va": "top"}
+        self.time = ax.annotate("", (1, 0), (0, -18), fontsize=9, annotation_clip=False, **below)
         moving = [*self.nodes.values(), *graph.texts, *self.lines.values(), *self.dots.values(), self.time]
         self.moving = sorted(moving, key=lambda artist: artist.get_zorder())
         for artist in moving:

@@ -170,7 +170,7 @@ def plot_formation(subject: Any, *, ax: Axes | None = None) -> Axes:
     for k, style in camp_lines(groups, range(len(groups))):
         (x, y), color = run.positions[k], style["color"]
         ax.plot(x, y, linewidth=width, gid=node_id(k, "run"), **style)
-        ax.plot(x[0], y[0], "o", markersize=3.5, markerfacecolor="white", markeredgecolor=color, zorder=4)
+        ax.plot(x[0], y[0], "o", markersize=3.5, markerfacecolor="white", markeredgecolor=color, zorder=5.5)
         ax.plot(x[-1], y[-1], "o", markersize=4.5, color=color, zorder=5, gid=node_id(k, "end"))
     ax.set_aspect("equal", adjustable="datalim")
     if run.graph.n_nodes <= 2 * NAMED_AGENTS:
