@@ -238,7 +238,9 @@ def test_every_page_is_sound_and_says_what_it_is(name: str, tmp_path: Path):
     assert sum(row[2].count(": ") for row in said) >= len(report.obligations)
     for s in report.obligations:
         (row,) = [
-            row for row in said if row[0] == s.kind and row[1].startswith(plain(f"{set_text(s.statement)} ({s.lemma})"))
+            row
+            for row in said
+            if row[0] == s.kind and row[1].startswith(plain(f"{set_text(s.statement)} ({set_text(s.lemma)})"))
         ]
         assert plain(f"{s.of}: {set_text(s.detail)}") in row[2]
     figures = {a["id"] for a in page.named("figure")}
