@@ -123,20 +123,18 @@ def cite(theorem: tuple[str, ...]) -> int:
 
     software prints that of this program.
     """
+    from ptcc_certify.certificate.certificate_file import RejectedCertificate
     from ptcc_certify.theorems.table import cite as bibtex
     from ptcc_certify.theorems.table import cite_software
 
-    words = " ".join(theorem)
-    named = re.sub(r"(?i)^theorem\s*", "", words)
-    if named.lower() == "software":
+    named = list(filter(None, (re.sub(r"(?i)^theorem\b\s*", "", word) for word in theorem)))
+    if len(named) > 1:
+        raise ParameterError("cite one theorem, or one certificate, at a time")
+    if [word.lower() for word in named] == ["software"]:
         click.echo(cite_software())
         return ExitCode.OK
-    from ptcc_certify.certificate.certificate_file import RejectedCertificate
-
-    if len(theorem) > 1 + ([word.lower() for word in theorem[:1]] == ["theorem"]):
-        raise ParameterError("cite one theorem, or one certificate, at a time")
     try:
-        applied = _theorems_of(words) if Path(words).suffix.lower() == ".json" else [named] * bool(named)
+        applied = _theorems_of(named[0]) if named and Path(named[0]).suffix.lower() == ".json" else named
     except RejectedCertificate as error:
         print_lines(f"rejected: {error}", err=True)
         return ExitCode.VIOLATED
