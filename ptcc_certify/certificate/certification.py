@@ -36,14 +36,15 @@ from ptcc_certify.certificate.request import (
     refuse_long_weights,
 )
 from ptcc_certify.checker.input_formulas import Limits
-from ptcc_certify.errors import ParameterError, gated
+from ptcc_certify.errors import HypothesisError, ParameterError, gated
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import as_family, as_graph
 from ptcc_certify.graphs.io.conversion import is_family
+from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.size_limits import (
     ONE_THREAD_NODES,
 )
-from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, analyse
 from ptcc_certify.lyapunov.follower_rows import leading_group, refuse_other_targets
 from ptcc_certify.model import Protocol
 from ptcc_certify.model.agents import Agents
@@ -53,12 +54,14 @@ from ptcc_certify.model.constrained_switching import SignalClass
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.refusals import (
+    asked_of_signals,
     refuse_agents,
     refuse_before_the_graph,
     refuse_beside,
     refuse_exchanged,
     refuse_of_families,
 )
+from ptcc_certify.theorems.family_behaviour import decide
 
 
 @gated  # type: ignore[misc]  # it takes the parts below, no others
@@ -175,17 +178,22 @@ def certify_case(
     of_family = bool(case.uncertainty or is_family(case.graph))
     case = with_vehicles(case.with_plain_agents(of_family)).with_rows(of_family)
     _refuse_before_reading(case)
-    progress, family = listener(progress), _read_family(case) if of_family else None
-    graph = as_graph(case.graph) if family is None else family.modes[0].mandatory
     refuse_before_the_graph(case)
+    progress, structure = listener(progress), None if of_family else analyse(as_graph(case.graph))
+    if structure is not None and asked_of_signals(structure, case):
+        of_family, case = True, replace(case, graph=[structure.graph])
+    family = _read_family(case) if of_family else None
+    if structure is None or family is not None:
+        assert family is not None
+        structure = analyse(family.modes[0].mandatory)  # for its nodes alone
+    graph = structure.graph
     if family is None:
         if case.signal != "any":
             raise ParameterError("signal is for families of graphs, which change; this is one graph: leave it out")
         refuse_long_weights(graph)
     else:
         refuse_signals(family, case)
-    structure, agents = analyse(graph), case.agents  # of a family for its nodes alone
-    chains, formation = None, None
+    chains, formation, agents = None, None, case.agents
     if agents is not None:
         chains = read_chains(agents, graph, case.protocol.gain, case.initial)
         formation = formation_on_a_line(case, agents, chains, of_family)
@@ -233,11 +241,12 @@ def with_word_of_check(certificate: Certificate) -> Certificate:
 
 def _read_family(case: Case) -> Family:
     """Return the family that is asked about, or refuse what it does not take."""
-    refuse_before_the_graph(case)
     refuse_of_families(case)
     family = as_family(case.graph, uncertainty=case.uncertainty)
     if case.messages is not None or case.leaders is not None:
         asked, mend, messages = "leaders that move", "leave it out", case.messages
+        if case.leaders is not None and case.leaders.growth:
+            _refuse_uncarried(family)
         if messages is not None:
             asked, late = messages.asked, messages.age > 0 and messages.gain_cap is None
             driven = messages.vehicles is not None and not messages.settles
@@ -249,6 +258,15 @@ def _read_family(case: Case) -> Family:
                 asked += "" if late else " of vehicles that exchange virtual positions"
         refuse_other_targets(family, asked, mend)
     return family
+
+
+def _refuse_uncarried(family: Family) -> None:
+    """Refuse agents that move by themselves where some target is neither 0, a leader nor its opposite."""
+    for component in decide(family):
+        if component.behaviour not in (STABILITY, BIPARTITE_CONSENSUS):
+            one = shorten(component.family.labels[-1])
+            why = "leave growth out, or let followers hear one leader, in ways that agree"
+            raise HypothesisError(f"agents move by themselves, and not all targets about {one} are leaders: {why}")
 
 
 def _refuse_before_reading(case: Case) -> None:

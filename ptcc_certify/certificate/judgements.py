@@ -214,7 +214,7 @@ def at_deadline(proof: GraphProof | FamilyProof, answer: Answer) -> Answer:
     if late.staged:
         return Answer(OPEN, what, "with deadlines of stages it holds, with one for all none is proved to hold it")
     if late.leaders is not None:
-        moving = late.leaders.speed > 0
+        moving = late.leaders.moving
         why = "leaders move, so that nobody is proved to settle" if moving else "disturbances leave something at T"
         return Answer(OPEN, what, why)
     if late.messages.gain_cap is not None:
@@ -230,7 +230,7 @@ def judge_rate_beside(proof: GraphProof | FamilyProof, least: Fraction, what: st
     late = proof.late
     if proof.constant or proof.agents is not None:
         return None
-    if (leaders := proof.asked_leaders) is not None and (leaders.total or leaders.sign_gain is not None):
+    if (leaders := proof.asked_leaders) is not None and not leaders.idle:
         return Answer(OPEN, what, f"no rate is proved {leaders.while_told}")
     if any(limits.sample_period is not None for limits in proof.limits):
         return Answer(OPEN, what, "no rate is proved of a gain that is held")

@@ -178,7 +178,7 @@ class Proof(OfQuestion):
     @property
     def leaders_move(self) -> bool:
         """Whether leaders move."""
-        return self.asked_leaders is not None and self.asked_leaders.speed > 0
+        return self.asked_leaders is not None and self.asked_leaders.moving
 
     @property
     def velocities(self) -> Sequence[Fraction] | None:

@@ -31,7 +31,7 @@ from lmi.exact.definite import Arithmetic
 from lmi.exact.elementary_enclosures import exp, rounded
 from lmi.exact.numbers import integers, longest
 from lmi.exact.work import spend
-from ptcc_certify.checker.delayed_forms import LARGEST_GROWTH, need_left_at_deadline
+from ptcc_certify.checker.delayed_forms import need_left_at_deadline
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import combination
 from ptcc_certify.checker.final_state import deviation_rows

@@ -24,15 +24,12 @@ from ptcc_certify.checker.graph import proved_above
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.lyapunov_form import Form
 from ptcc_certify.checker.matrix_products import quadratic
-from ptcc_certify.checker.message_ages import Messages, need_left
+from ptcc_certify.checker.message_ages import LARGEST_GROWTH, Messages, need_left
 from ptcc_certify.checker.reading import RejectedError, length, need
 from ptcc_certify.checker.section_declarations import FewAgents, Positive
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.stated_bounds import DecayOfAll
 from ptcc_certify.checker.structure import Structure
-
-#: Largest ``b gain_cap delay``; what is larger asks for a ``q`` that nothing allows.
-LARGEST_GROWTH = 1000
 
 
 @dataclass(frozen=True)

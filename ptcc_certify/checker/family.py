@@ -190,6 +190,12 @@ class Component:
         """The number of its nodes and of the entries of the basis."""
         return len(self.nodes) + sum(map(len, self.kernel.values()))
 
+    @property
+    def carried(self) -> bool:
+        """Whether all targets are 0, a pivot or its opposite: what an odd function of agents makes of pivots, too."""
+        entries = (row.values() for row in self.kernel.values())
+        return not self.depends and all(sum(map(abs, row)) in (0, 1) and len(row) < 2 for row in entries)
+
     @cached_property
     def whole(self) -> tuple[dict[int, dict[int, int]], int]:
         """The rows of the basis in integers, and what divides them."""

@@ -17,12 +17,12 @@ from lmi.exact.decimal_rounding import down
 from lmi.exact.elementary_enclosures import exp
 from lmi.exact.numbers import shorten
 from lmi.exact.work import spend
-from ptcc_certify.checker.delayed_forms import LARGEST_GROWTH, LateFormWitness, need_left_at_deadline
+from ptcc_certify.checker.delayed_forms import LateFormWitness, need_left_at_deadline
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.family import Component, Family
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.input_formulas import drift_above
-from ptcc_certify.checker.message_ages import Messages
+from ptcc_certify.checker.message_ages import LARGEST_GROWTH, Messages
 from ptcc_certify.checker.protocol import Begin
 from ptcc_certify.checker.reading import RejectedError, length, need
 from ptcc_certify.checker.section_declarations import FewAgents, Nodes, NotNegative
@@ -47,7 +47,8 @@ class LateFamilyForm:
     """A function of a component of a family under small delays: its root at first, and the share that is left.
 
     Where values are off or agents disturbed how far agents may be from their targets, over the root, what errors make
-    of it, and what disturbances add to it per unit of time.
+    of it, and what disturbances add to it per unit of time; where agents move by themselves that, too, and at what rate
+    that lets it grow.
     """
 
     nodes: Nodes
@@ -56,6 +57,7 @@ class LateFamilyForm:
     sizes: FewAgents | None = None
     floor: NotNegative | None = None
     push: NotNegative | None = None
+    growth: NotNegative | None = None
 
 
 def check_forms_of_family(
@@ -125,8 +127,9 @@ class _FormUnderDelays:
         """Verify what is said of the function; return the decay that follows."""
         (q, b, kap), V, nodes, wrong = numbers, self.V, self.nodes, self.wrong > 0
         told = [one is not None for one in (entry.floor, witness.psi, entry.push, entry.sizes)]
-        asked = [wrong, wrong, self.disturbance > 0, wrong or self.disturbance > 0]
+        asked = [wrong, wrong, self.disturbance > 0, wrong or self.disturbance > 0 or self.messages.growth > 0]
         need(told == asked, "floor and psi are told iff values are off, push iff agents are disturbed, sizes of both")
+        need((entry.growth is None) == (not self.messages.growth), "growth is told iff agents move by themselves")
         bits = length((*numbers, self.late, self.wrong, entry.initial, entry.left, V.rate, *witness.phi))
         spend(50 * len(nodes) * len(self.family.modes), bits, bits, "small delays")
         need(b > 0 and b * self.late <= LARGEST_GROWTH, "b is not positive, or too large")
@@ -135,14 +138,17 @@ class _FormUnderDelays:
         phi = self._outweighing("phi", witness.phi, Fraction(1), pushes, self.late * q)
         need(kap >= 0 and all(kap**2 >= V.largest(push) for push in pushes), "kap is too small")
         need(b + self.late * q * kap <= V.rate / 2, "the delay takes more than the rate")
-        need(entry.initial >= V.root(x), "initial is not proved")
+        grown, lasts = self._grown(entry, b)
+        self.wrong *= lasts
+        need(entry.initial >= grown * V.root(x), "initial is not proved")
         need_left_at_deadline(self.messages, b, entry.left)
         falling, none = [y * entry.initial for y in phi], [Fraction(0)] * len(nodes)
         standing, stays = none, Fraction(0)
         if witness.psi is not None and entry.floor is not None:
             standing, stays = self._floor(witness.psi, entry.floor), entry.floor
         if entry.push is not None:
-            need(entry.push**2 >= V.largest(dict.fromkeys(nodes, self.disturbance)), "push is too small")
+            least_push = lasts * lasts * V.largest(dict.fromkeys(nodes, self.disturbance))
+            need(entry.push**2 >= least_push, "push is too small")
             most = entry.push / (b * self.messages.least_gain())
             standing = [y + share * most for y, share in zip(standing, phi, strict=True)]
             stays += entry.push * drift_above(self.messages.gain, b, self.messages.gain_cap)
@@ -162,6 +168,19 @@ class _FormUnderDelays:
         found = self._outweighing("psi", psi, floor, off, Fraction(1))
         need(all((floor * self.V.rate / 2) ** 2 >= self.V.largest(push) for push in off), "floor is too small")
         return found
+
+    def _grown(self, entry: LateFamilyForm, b: Fraction) -> tuple[Fraction, Fraction]:
+        """Verify how fast ``sqrt(V)`` may grow as agents move by themselves.
+
+        Return by how much more it has grown by ``T``, and how much more stands of what drives it. In their coordinates agents part at no more than ``growth |xi_k| <= growth size_k sqrt(V)``.
+        """
+        if entry.growth is None or entry.sizes is None:
+            return Fraction(1), Fraction(1)
+        pivots, growth = set(self.V.component.pivots.values()), self.messages.growth
+        parting = {v: Fraction(0) if v in pivots else growth * entry.sizes[v] for v in self.nodes}
+        need(entry.growth**2 >= self.V.largest(parting), "growth is too small")
+        grown = self.messages.grown(entry.growth)
+        return grown, self.messages.lasting(entry.growth, b) or grown
 
     def _heard(self, values: Numbers) -> list[dict[int, Fraction]]:
         """Return ``(B phi)_k`` of every mode."""

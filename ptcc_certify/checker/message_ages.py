@@ -9,16 +9,18 @@ from functools import cached_property
 from math import ceil
 from typing import Literal
 
-from lmi.exact.elementary_enclosures import log
+from lmi.exact.elementary_enclosures import exp, log, rounded
 from lmi.exact.numbers import longest
 from lmi.exact.work import spend
-from ptcc_certify.checker.input_formulas import Limits, PrescribedGain, decay_above
+from ptcc_certify.checker.input_formulas import BITS, Limits, PrescribedGain, decay_above
 from ptcc_certify.checker.reading import length, need
 from ptcc_certify.checker.section_declarations import EdgeNumbers, NotNegative, Positive
 from ptcc_certify.checker.side_files import Numbers
 
 #: Ages of what is heard over single edges are rounded up to so many parts of the largest one.
 PARTS = 64
+#: Exponents of what grows, at most: ``b gain_cap delay``, ``growth T``.
+LARGEST_GROWTH = 1000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,11 +33,14 @@ class Moving:
         Of every leader, and of every follower, at most.
     sign_gain : Fraction or None
         What followers add times ``sign(e_k)``: at least the sum of these.
+    growth : Fraction
+        The Lipschitz constant of what all agents do by themselves, which is odd.
     """
 
     speed: NotNegative
     disturbance: NotNegative
     sign_gain: Fraction | None = None
+    growth: NotNegative = Fraction(0)
 
     @property
     def push(self) -> Fraction:
@@ -92,8 +97,36 @@ class Messages:
         p, gain, push = b * self.gain.k, self.gain, Fraction(0) if self.leaders is None else self.leaders.push
         if self.delay or self.value_error or p < 1 or (push and p == 1):
             return None
-        most = self.least_gain() * initial
+        most, push = self.least_gain() * initial, push * self.grown(self.growth)
         return most + push / least * (gain.rho1 * gain.T + gain.k) / (p - 1) if push else most
+
+    @property
+    def growth(self) -> Fraction:
+        """At what rate what agents do by themselves parts two of them, at most."""
+        return Fraction(0) if self.leaders is None else self.leaders.growth
+
+    def grown(self, growth: Fraction) -> Fraction:
+        """Bound ``e^(growth T)`` from above: by so much more is left of anything at ``T`` than without growth.
+
+        Raises
+        ------
+        RejectedError
+            It is too large.
+        """
+        if not growth:
+            return Fraction(1)
+        need(growth * self.gain.T <= LARGEST_GROWTH, "agents part too fast by themselves")
+        return rounded(exp(rounded(growth * self.gain.T, BITS, up=True), BITS)[1], BITS, up=True)
+
+    def lasting(self, growth: Fraction, b: Fraction) -> Fraction | None:
+        """Return how much more of what drives agents stands, at all times; None if after ``T`` it grows.
+
+        Up to ``T`` that is ``e^(growth T)``; from there on ``g/(g - growth/b)`` under a gain of at least ``g``.
+        """
+        if not growth:
+            return Fraction(1)
+        room = 1 - growth / (b * self.least_gain(always=True))
+        return max(self.grown(growth), 1 / room) if room > 0 else None
 
     def latency_of(self, edge: int) -> Fraction:
         """Return the latency of an edge, by its place among all."""
@@ -184,6 +217,8 @@ def check_delays(gain: PrescribedGain, section: Delays) -> Messages:
     if leaders is not None and leaders.sign_gain is not None:
         need(leaders.sign_gain >= leaders.speed + leaders.disturbance, "sign_gain is below speed + disturbance")
         need(not virtual and section.own == "fresh", "a sign term of virtual positions, or of a late own state")
+    if leaders is not None and leaders.growth:
+        need(not virtual and delay == 0, "agents that move by themselves beside virtual positions, or late messages")
     late, cap = section.own == "late", section.gain_cap
     need(cap is not None or not late, "the own state is late, and the gain has no cap: the protocol diverges")
     return Messages(gain, latency, delay, late, section.value_error, cap, leaders)

@@ -98,6 +98,9 @@ def check_messages(
         need(not protocol.sliding, "leaders that move under the sliding-mode protocol")
         need(all(getattr(section, key) is None for key in AT_REST), f"one of {', '.join(AT_REST)} though leaders move")
         need(section.steps is None or messages.leaders.sign_gain is None, "steps beside a sign term")
+    if messages.growth:
+        carried = isinstance(of, Family) and all(one.carried for one in of.components)
+        need(carried, "agents that move by themselves to targets that are neither 0, a leader nor its opposite")
     need(len(section.rows) <= MANY_ROWS, f"more than {MANY_ROWS} witnesses of rows")
     by_rows = bool(section.rows) or section.steps is not None
     bounded = by_rows or section.forms is not None
@@ -185,26 +188,30 @@ def _check_rows(
     rows = Rows(followers, obligation["witness"].u)
     rows.decay(q, b, messages.parts)
     limit = need_left(messages, q, b, cap, clock, left)
-    rows.above_initial(initial)
-    rows.above_floor(floor, messages.wrong)
-    drift, floor_up_to_T = Fraction(0), floor
+    grown = messages.grown(messages.growth)
+    more = messages.lasting(messages.growth, b) or grown
+    rows.above_initial(initial / grown)
+    rows.above_floor(floor, messages.wrong * more)
+    drift, highest = Fraction(0), floor
     if messages.leaders is not None:
-        drift, after = _drift(messages, messages.leaders, rows, b, limit, entry)
-        floor_up_to_T += after * messages.least_gain(always=True) / messages.least_gain()
+        drift, after = _drift(messages, messages.leaders, rows, b, limit, entry, more)
+        highest += after * messages.least_gain(always=True) / messages.least_gain()
     for one in stated:
-        one.by_rows(rows, Decay(b, cap, left, initial, floor, drift, floor_up_to_T))
+        one.by_rows(rows, Decay(b, cap, left, initial, floor, drift, highest))
     doc.done(f"b = {down(b)}, q = {down(q)}")
 
 
 def _drift(
-    messages: Messages, leaders: Moving, rows: Rows, b: Fraction, limit: Fraction | None, entry: RowsBound
+    messages: Messages, leaders: Moving, rows: Rows, b: Fraction, limit: Fraction | None, entry: RowsBound,
+    more: Fraction,
 ) -> tuple[Fraction, Fraction]:
-    """Verify what leaders that move, and disturbances, add at ``T``, and at all times."""
+    """Verify what leaders that move, and disturbances, add at ``T``, and at all times: ``more`` of it stands."""
     drift, after, gain = entry.drift or Fraction(0), entry.after or Fraction(0), messages.gain
-    bits = length((leaders.push, rows.least, drift, after, b, limit or b, gain.T, gain.rho1, gain.k))
+    push, grown = leaders.push, messages.grown(messages.growth)
+    bits = length((push, rows.least, drift, after, b, limit or b, gain.T, gain.rho1, gain.k, grown, more))
     spend(100, bits, bits, "drift of followers")
-    need(drift >= leaders.push / rows.least * drift_above(gain, b, limit), "drift is not proved")
-    rows.above_push(after, leaders.push / messages.least_gain(always=True))
+    need(drift >= grown * push / rows.least * drift_above(gain, b, limit), "drift is not proved")
+    rows.above_push(after, more * push / messages.least_gain(always=True))
     return drift, after
 
 

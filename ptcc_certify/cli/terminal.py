@@ -212,8 +212,11 @@ class _LogFile(logging.FileHandler):
 
 @contextmanager
 def progress(steps: Sequence[str], quiet: bool = False) -> Iterator[Callable[[str], None]]:
-    """Show which of some steps is at work, and log each with its seconds; on a terminal the line goes at the end."""
-    began, last = time.monotonic(), ""
+    """Show which of some steps is at work, and log each with its seconds; on a terminal the line goes at the end.
+
+    A graph that has something proved as a family takes the steps of one, of which some have other names.
+    """
+    began, last, place = time.monotonic(), "", {step: k for k, step in enumerate(steps)}
     with _bar("TimeElapsedColumn", quiet=quiet) as add:
         update = add("", total=len(steps))
 
@@ -223,7 +226,7 @@ def progress(steps: Sequence[str], quiet: bool = False) -> Iterator[Callable[[st
                 LOG.info("%s: %.3f s", last, time.monotonic() - began)
             began, last = time.monotonic(), step
             if step:
-                update(completed=steps.index(step), description=step)
+                update(description=step, **({"completed": place[step]} if step in place else {}))
 
         yield begin
         begin("")

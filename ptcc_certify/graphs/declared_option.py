@@ -119,7 +119,7 @@ def options_of(*kinds: Any) -> Mapping[str, Option]:
     --------
     >>> from ptcc_certify.model.moving_leaders import MovingLeaders
     >>> {name: told.key for name, told in options_of(MovingLeaders).items()}
-    {'speed': 'leaders.speed', 'sign_gain': 'leaders.sign_gain'}
+    {'speed': 'leaders.speed', 'sign_gain': 'leaders.sign_gain', 'growth': 'leaders.growth'}
     """
     found = {}
     for kind in kinds:

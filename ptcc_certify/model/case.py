@@ -131,7 +131,7 @@ MovingLeaders(speed=0, disturbance=1), None, None)
         if asks.delta is not None and (leaders is None or not leaders.disturbance):
             disturbance, asks = parameter("delta", asks.delta, True), replace(asks, delta=None)
             leaders = replace(leaders or MovingLeaders(speed=0), disturbance=disturbance)
-        if leaders is not None and not leaders.total and leaders.sign_gain is None:
+        if leaders is not None and leaders.idle:
             leaders = None  # they rest, and nothing disturbs anybody
         if asks.noise is not None and (messages is not None or leaders is not None or of_family):
             error, asks = 2 * parameter("noise", asks.noise), replace(asks, noise=None)

@@ -196,8 +196,8 @@ lambda of L, or measure the own state without delay
 
     @property
     def settles(self) -> bool:
-        """Whether nothing disturbs anybody, and no value is off."""
-        return not self.value_error and (self.leaders is None or not self.leaders.total)
+        """Whether nothing moves or disturbs anybody, and no value is off."""
+        return not self.value_error and (self.leaders is None or not (self.leaders.total or self.leaders.growth))
 
     @property
     def asked(self) -> str:
@@ -209,8 +209,9 @@ lambda of L, or measure the own state without delay
     @property
     def asked_of_leaders(self) -> str:
         """What is asked by their leaders, in words: that they move, disturbances, or a cap alone."""
-        if self.leaders is not None and self.leaders.total:
-            return "leaders that move" if self.leaders.speed else "disturbances"
+        if self.leaders is not None and not self.leaders.idle:
+            moved = "disturbances" if self.leaders.disturbance else "agents that move by themselves"
+            return "leaders that move" if self.leaders.speed else moved
         return "a gain cap"
 
     def latencies(self, of: SignedDigraph | Family) -> Fraction | tuple[Fraction, ...]:

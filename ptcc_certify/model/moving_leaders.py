@@ -1,7 +1,10 @@
 """Leaders that move: how fast, what disturbs the followers, and the sign term that keeps them on their targets.
 
-x_j' = v_j,  |v_j| <= speed                                              a leader, which listens to nobody
-x_k' = -gain(t) (L x)_k + d_k [ + sign_gain sign(e_k) ],  |d_k| <= disturbance,  e = -L x      a follower
+x_j' = f(t, x_j) + v_j,  |v_j| <= speed                                  a leader, which listens to nobody
+x_k' = f(t, x_k) - gain(t) (L x)_k + d_k [ + sign_gain sign(e_k) ],      a follower, |d_k| <= disturbance,  e = -L x
+
+``f`` is what every agent does by itself: 0, or anything with ``|f(t, x) - f(t, y)| <= growth |x - y|`` that is odd in
+``x``, which nobody need know.
 """
 
 from __future__ import annotations
@@ -30,6 +33,8 @@ class MovingLeaders(Parameters):
     sign_gain : number or str, optional
         What followers add times ``sign(e_k)``, at least ``speed + disturbance``: they stay on their targets after
         ``T``. Without it they are there at ``T``.
+    growth : number or str
+        The Lipschitz constant of ``f``, not negative, 1/time.
 
     Raises
     ------
@@ -65,6 +70,13 @@ give 2 or more
         Given(),
         unit="state/time",
     )
+    growth: NotNegative = option(
+        "--growth L",
+        "Agents move by themselves, too: x' = f(x) + u, any odd f with |f(x) - f(y)| <= L |x - y|.",
+        NotNegative(0),
+        example="0.3",
+        unit="1/time",
+    )
 
     def __post_init__(self) -> None:
         if self.sign_gain is not None and self.sign_gain < self.total:
@@ -76,16 +88,26 @@ give 2 or more
             )
 
     @property
+    def moving(self) -> bool:
+        """Whether leaders move, as they like or by themselves."""
+        return bool(self.speed or self.growth)
+
+    @property
     def while_told(self) -> str:
         """During what something holds or not: while they move, under disturbances, or under a cap alone."""
-        if self.speed:
-            return "while leaders move"
+        if self.moving:
+            return "while leaders move" if self.speed else "while agents move by themselves"
         return "under disturbances" if self.disturbance else "under a cap"
 
     @property
     def goal(self) -> str:
         """Where followers are drawn to: a target, or where leaders rest and nothing disturbs a final state."""
-        return "target" if self.total else "final state"
+        return "target" if self.total or self.growth else "final state"
+
+    @property
+    def idle(self) -> bool:
+        """Whether leaders rest, and nothing moves or disturbs anybody."""
+        return not (self.total or self.growth or self.sign_gain is not None)
 
     @property
     def total(self) -> Fraction:

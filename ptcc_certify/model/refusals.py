@@ -43,10 +43,6 @@ _NOT_LATE = {
     "sample_period": "of late messages a period tells how often they are sent; give that instead",
     "delta": "is given twice: MovingLeaders(disturbance=..) tells what disturbs the followers; leave one of them out",
 }
-_PUSHED = {
-    True: "leaders that move as they like:",
-    False: "disturbances beside such messages: give weights that are uncertain, if by 0.1 % alone; otherwise",
-}
 _CAPPED = "followers of leaders that move are certified under one gain cap alone; leave others out"
 #: What is not certified beside leaders that move.
 _NOT_TRACKING = {
@@ -83,17 +79,41 @@ def refuse_before_the_graph(case: Case) -> None:
         raise ParameterError("limits, delta and noise are for the nominal protocol; the sliding mode has its own delta")
 
 
+def asked_of_signals(structure: Structure, case: Case) -> bool:
+    """Tell whether what is asked of one graph is proved of families alone, of which it is one of a single mode.
+
+    These are agents that move by themselves, disturbances beside messages where leaders hear each other, and values
+    that are off without a gain cap.
+
+    Examples
+    --------
+    >>> from ptcc_certify.model.case import Case
+    >>> pair = analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1)]))
+    >>> asked_of_signals(pair, Case(pair.graph, NominalProtocol(), messages=LateMessages(value_error=1)))
+    True
+    """
+    messages = case.messages
+    groups = any(len(c.nodes) > 1 for c in structure.closed_components)
+    if messages is None or case.sliding or (groups and not messages.at_rest):
+        return False
+    if messages.leaders is not None:
+        return groups or messages.leaders.growth > 0
+    return groups and messages.value_error > 0 and messages.gain_cap is None
+
+
 def refuse_of_families(case: Case) -> None:
     """Refuse what is asked of one graph alone, where a family is given."""
     given = [] if case.asks.method == "best" else ["method"]
     given += [name for name in NOT_OF_FAMILIES if (value := case.given(name)) is not None and value is not False]
+    if case.messages is not None and "at" in given:
+        given.remove("at")  # bounds with these are told at any instant
     if isinstance(case.agents, Agents) and case.agents.of_paper:
         given.remove("agents")  # in a formation
         if case.agents.biases is not None:
             raise ParameterError("biases", "of a family make other places in every graph; give offsets instead")
     if given:
         mend = {"limits": "families take one gain cap alone; leave others out", "delta": _NOT_LATE["delta"]}
-        text = "is not for families of graphs yet; leave it out, or certify one graph"
+        text = "is not for families of graphs yet, nor for what one graph has proved as one; leave it out"
         raise ParameterError(given[0], mend.get(given[0], text))
     _refuse_beside_any_graph(case)
     if case.messages is not None and case.messages.own_delay:
@@ -143,6 +163,7 @@ it out
     asked |= {
         "delta": asked["delta"] or (leaders is not None and leaders.disturbance > 0),
         "sign_gain": leaders is not None and leaders.sign_gain is not None,
+        "growth": leaders is not None and leaders.growth > 0,
         "own_delay": messages is not None and messages.own_delay,
     }
     if name := next((name for name, given in asked.items() if given), None):
@@ -188,7 +209,7 @@ def refuse_beside(structure: Structure, case: Case) -> None:
     if leaders is not None:
         if messages is None or messages.leaders is None:
             raise ParameterError("leaders", "that move are not certified of these agents; leave them out")
-        refuse_leader_groups(structure, f"{_PUSHED[bool(leaders.speed)]} a bound")
+        refuse_leader_groups(structure, "leaders that move as they like: a bound")
     if messages is not None:
         _refuse_messages(structure, messages, [limit.gain_cap for limit in case.limits])
     if structure.graph.n_edges == 0:
@@ -212,9 +233,6 @@ def _refuse_messages(structure: Structure, messages: LateMessages, caps: Sequenc
         raise ParameterError("gain_cap", "limits and late messages have two; give both the same, or messages alone")
     if messages.value_error and messages.own_delay:
         raise ParameterError("values that are off are not certified where the own state is late; leave one of them out")
-    if messages.value_error and messages.gain_cap is None:
-        of_family = "add a gain cap, or give weights that are uncertain, if by 0.1 % alone"
-        refuse_leader_groups(structure, f"what values that are off add: {of_family}; otherwise a bound")
     if messages.gain_cap is None and not messages.leaders_hear_at_once(structure):
         at_once = f"delays of 0 within their group{', and no period' if messages.held else ''}"
         mend = f"add a gain cap, or let leaders hear each other at once ({at_once})"
@@ -227,7 +245,7 @@ def refuse_together(messages: LateMessages | None, leaders: MovingLeaders | None
     Raises
     ------
     ParameterError
-        The own states of followers are late.
+        The own states of followers are late, or messages where agents move by themselves.
 
     Examples
     --------
@@ -238,6 +256,9 @@ leave one of the two out
     """
     if messages is None or leaders is None:
         return
+    if messages.age and leaders.growth:
+        why = "a target that moves by itself goes on while messages come, and nothing tells how far"
+        raise ParameterError("growth", f"beside late messages is not certified: {why}; leave one of the two out")
     if messages.own_delay:
         what = "of leaders at rest" if leaders.speed else "without disturbances"
         raise ParameterError(

@@ -8,6 +8,9 @@ and followers are pushed by ``d gain(t)/g``: within the limits of ``v`` and ``d`
 
     eps_(i+1) = E eps_i + (I - E) L_F^-1 (d - X*') / g,    E = e^(-L_F (s_(i+1) - s_i)).
 
+Where agents move by themselves ``f(x) = growth x``, by which they part fastest: over a step that multiplies positions
+and ``eps`` by ``e^(growth dt)``, and what drives them is as much less before.
+
 So without the sign term every run is a solution, up to rounding. The sign term is held over steps, at a value that
 ``mu sign(e)`` takes where the step ends: of any within ``mu`` where ``e`` is 0 there, so that it stays 0.
 """
@@ -83,7 +86,9 @@ class WorstLeaders:
             self.Q = -np.linalg.solve(self.L_F, L[np.ix_(F, self.heads)])
         except np.linalg.LinAlgError:
             raise ParameterError("the weights lie too far apart for a run: floats lose who follows whom") from None
-        self.speed, self.delta = float(leaders.speed), float(leaders.disturbance)
+        self.speed, self.delta, self.growth = (
+            float(x) for x in (leaders.speed, leaders.disturbance, leaders.growth)
+        )
         try:
             self.weights = np.ones(F.size) if u is None else np.asarray(u, dtype=float)
         except (TypeError, ValueError):
@@ -176,14 +181,15 @@ def simulate_tracking(
     clock = np.diff(run.gain.clock(t, np.maximum(remaining, JUST_BEFORE)))
     states, targets, inputs = np.zeros((3, t.size, structure.graph.n_nodes))
     lead, eps = x[heads], x[F] - worst.Q @ x[heads]
+    grown = np.exp(worst.growth * passed)
     for i in range(t.size):
         states[i, heads] = targets[i, heads] = lead
         targets[i, F] = worst.Q @ lead
         states[i, F] = targets[i, F] + eps
         inputs[i, F] = -run.gains[i] * (worst.L_F @ eps)
         if i < passed.size:
-            moved, eps = step_of(eps, clock[i], highest[i])
-            lead, inputs[i, heads] = lead + moved, moved / passed[i]
+            moved, eps = step_of(eps * grown[i], clock[i], highest[i])
+            lead, inputs[i, heads] = lead * grown[i] + moved, moved / passed[i]
         inputs[i, F] += step_of.term
     return run.stepped(states.T, Tolerances(NEAREST, NEAREST), held_input=inputs.T, targets=targets.T)
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lmi.errors import NoCertificate
 from lmi.exact.decimal_rounding import float_down, float_up
 from lmi.exact.elementary_enclosures import rounded
 from ptcc_certify.bounds.decay import Decay
@@ -19,6 +20,7 @@ from ptcc_certify.bounds.instants import Instants
 from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above, gain_above
 from ptcc_certify.checker.lyapunov_form import Form
 from ptcc_certify.checker.message_ages import PARTS, Messages, Moving
+from ptcc_certify.checker.reading import RejectedError
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.stated_bounds import DecayOfAll
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -217,6 +219,24 @@ class LateCase:
     def push(self) -> Fraction:
         """How fast a follower and its target may part: 0 with a sign term, which takes that up."""
         return Fraction(0) if self.leaders is None or self.signed else self.leaders.total
+
+    @property
+    def growth(self) -> Fraction:
+        """At what rate agents that move by themselves part, at most."""
+        return self.exact.growth
+
+    def grown(self, growth: Fraction) -> Fraction:
+        """Bound ``e^(growth T)`` from above.
+
+        Raises
+        ------
+        NoCertificate
+            It is too large.
+        """
+        try:
+            return self.exact.grown(growth)
+        except RejectedError as error:
+            raise NoCertificate(str(error)) from None
 
     # ------------------------------------------------------------------ the gain that acts
 

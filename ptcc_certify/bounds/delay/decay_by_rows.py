@@ -40,6 +40,8 @@ from ptcc_certify.model.gain import Gain
 SEARCHED_FOLLOWERS = 3000
 #: Values of ``q`` that are tried, and the largest one; losses of ``b`` for a more even vector.
 _TRIED, _LARGEST_Q, _LOSSES = 10, 1e9, (0.01, 0.2, 0.6)
+#: The largest exponent of what grows after ``T``, in floats.
+_LARGEST_EXPONENT = 700.0
 #: The share of the time that is left where bounds of followers of moving leaders are compared.
 _JUDGED = 0.05
 #: What is added to a bound in floats, relatively and absolutely, so that it holds.
@@ -73,6 +75,11 @@ class RowBound:
     drift: Fraction | None = None
     after: Fraction | None = None
 
+    def stays(self, case: LateCase) -> bool:
+        """Whether what is left at ``T`` is never exceeded later: nothing is, or growth is slower than the decay then."""
+        left = self.initial * self.left or self.floor or self.after
+        return not left or case.exact.lasting(case.growth, self.witness.b) is not None
+
     def residual(self, after: bool = False) -> np.ndarray:
         """Return what bounds ``|x_k - x_k*|`` at ``T``, or from there on, for every follower, in floats from above."""
         most = self.initial * self.left + self.floor + ((self.after if after else self.drift) or 0)
@@ -84,18 +91,18 @@ class RowBound:
         After ``T`` the gain is low again: from what they added by then they add ever more, at most ``after``.
         """
         push = float(case.push) / float(self.witness.u.min())
-        return driven(case, self.witness.b, push, self.cap, float(self.after or 0), t)
+        return driven(case, self.witness.b, push, self.cap, float(self.after or 0), t, case.growth)
 
     def deviation_bound(self, case: LateCase, t: np.ndarray) -> np.ndarray:
         """Return what bounds ``|x_k - x_k*|`` of followers at instants, ``(F, M)`` floats."""
-        y, added = self.decay(case, t)
-        return self.witness.u[:, None] * (float(self.initial) * y + (float(self.floor) + added)) * MORE
+        return self.over_time(case, t).bound[case.followers]
 
     def over_time(self, case: LateCase, t: np.ndarray) -> Moments:
         """Return the same of all agents, 0 of others than followers."""
         (y, added), u = self.decay(case, t), np.zeros((len(case.of.labels), 1))
         u[case.followers, 0] = self.witness.u
-        return Moments(float(self.witness.b), y, u * (float(self.initial) * y + added), u * float(self.floor))
+        floor = lasting(case, self.witness.b, float(self.floor), t, case.growth)
+        return Moments(float(self.witness.b), y, u * (float(self.initial) * y + added), u * floor)
 
     def highest_floor(self, case: LateCase) -> Fraction:
         """Return what errors of values, leaders that move and disturbances add at most up to ``T``."""
@@ -129,21 +136,36 @@ def _decayed(remaining: np.ndarray, p: float) -> np.ndarray:
 
 
 def driven(
-    case: LateCase, b: Fraction, push: float, cap: Fraction | None, after: float, t: np.ndarray
+    case: LateCase,
+    b: Fraction,
+    push: float,
+    cap: Fraction | None,
+    after: float,
+    t: np.ndarray,
+    growth: Fraction = Fraction(0),
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return ``y = e^(-b s_c)``, and what ``push`` per unit of time adds to what decays like it, (M,) floats each.
 
-    After ``T`` the gain is low again: from what was added by then ever more is, at most ``after``.
+    After ``T`` the gain is low again: from what was added by then ever more is, at most ``after`` if growth is slower
+    than the decay then. With growth ``y`` is multiplied by ``e^(growth (t - T))``, what is added by ``e^(growth t)``.
     """
-    T, added = float(case.protocol.T), np.zeros(t.shape)
+    T, added, part = float(case.protocol.T), np.zeros(t.shape), float_up(growth)
     if push:
         least, low = case.least_cap(cap), case.exact.least_gain(always=True)
         before = push * drift_integral(case.protocol.gain, float(b), least, np.append(t, T))
-        rate = float(b) * float(low if least is None else min(low, least))
+        before *= np.exp(part * np.append(np.minimum(t, T), T))
+        rate = (float(b) * float(low if least is None else min(low, least)) - part) or -LEAST
         grown = -np.expm1(-rate * np.maximum(t - T, 0))
         later = before[-1] * (1 - grown) + push / rate * grown
-        added = np.where(t > T, np.minimum(later, after), before[:-1])
-    return case.decay(b, t, cap), added
+        added = np.where(t > T, np.minimum(later, after if rate > 0 else np.inf), before[:-1])
+    y = case.decay(b, t, cap)
+    return np.where(y > 0, y * np.exp(np.minimum(part * (t - T), _LARGEST_EXPONENT)), 0.0), added
+
+
+def lasting(case: LateCase, b: Fraction, floor: float, t: np.ndarray, growth: Fraction) -> np.ndarray:
+    """Return what errors add at instants, (M,) floats: after ``T`` infinite where growth outpaces the decay."""
+    lost = bool(floor) and case.exact.lasting(growth, b) is None
+    return np.where((t > float(case.protocol.T)) & lost, np.inf, floor)
 
 
 def drift_integral(gain: Gain, b: float, cap: Fraction | None, t: np.ndarray) -> np.ndarray:
@@ -238,7 +260,7 @@ def search_rows(case: LateCase, rows: FollowerRows, first: np.ndarray) -> tuple[
     if any(row.inputs(case, rows) is not None for row in candidates):
         aims.append(lambda row: _peak(row.inputs(case, rows)))
     if case.leaders is not None:
-        aims.append(lambda row: float(row.residual(after=True).max()))
+        aims.append(lambda row: float(row.residual(after=True).max()) if row.stays(case) else math.inf)
     if case.leaders is not None and not case.messages.age:  # nothing is left at T without a cap
         aims.append(lambda row: float(row.deviation_bound(case, near).max()))
     return tuple(dict.fromkeys(min(candidates, key=aim) for aim in aims))
@@ -286,12 +308,15 @@ def row_bound(case: LateCase, rows: FollowerRows, first: np.ndarray, witness: Ro
             raise NoCertificate("q = 1 serves no delay")
         cap = rounded(log(witness.q)[0] / (witness.b * age), BITS)
     floor = max(rows.floor(witness, float(case.exact.wrong)), LEAST) if case.exact.wrong else 0.0
-    initial = Fraction(float((first / witness.u).max()) * MORE)
-    row = RowBound(witness, cap, case.clock(cap), case.left(witness.b, cap), initial, Fraction(floor * MORE))
+    grown = case.grown(case.growth)
+    more = case.exact.lasting(case.growth, witness.b) or grown
+    initial = Fraction(float((first / witness.u).max()) * MORE) * grown
+    floor = Fraction(floor * MORE) * more
+    row = RowBound(witness, cap, case.clock(cap), case.left(witness.b, cap), initial, floor)
     if case.leaders is None:
         return row
-    push = case.push / Fraction(float(witness.u.min()))
+    push = case.push / Fraction(float(witness.u.min())) * grown
     drift = push * drift_above(case.protocol.gain.exact, witness.b, case.least_cap(cap))
     flattest = Fraction(float((1 / rows.slack(witness)).max()) * MORE)
-    after = flattest * case.push / case.exact.least_gain(always=True)
+    after = more * flattest * case.push / case.exact.least_gain(always=True)
     return replace(row, drift=rounded(drift, BITS, up=True), after=rounded(after, BITS, up=True))

@@ -22,15 +22,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
 
+from lmi.errors import NoCertificate
 from lmi.exact.decimal_rounding import float_up
 from lmi.exact.elementary_enclosures import exp, rounded
 from ptcc_certify.bounds.delay.case import LateCase, Moments
-from ptcc_certify.bounds.delay.decay_by_rows import driven
+from ptcc_certify.bounds.delay.decay_by_rows import driven, lasting
 from ptcc_certify.checker.forms_of_families import Edge, heard_in_mode
 from ptcc_certify.checker.input_formulas import BITS, drift_above, root_above
 from ptcc_certify.checker.signal_bounds import Function, least
@@ -66,6 +68,8 @@ class FamilyForm:
     floor, push : Fraction or None
         What errors add to the root, and disturbances per unit of time; None where there are none.
     sizes, psi : tuple of N Fraction, or None
+    growth : Fraction or None
+        At what rate agents that move by themselves let the root grow.
     """
 
     function: int
@@ -80,6 +84,7 @@ class FamilyForm:
     push: Fraction | None = None
     sizes: tuple[Fraction, ...] | None = None
     psi: tuple[Fraction, ...] | None = None
+    growth: Fraction | None = None
 
     def decay(self, case: LateCase) -> DecayOfAll:
         """Return what it says of the agents of the component."""
@@ -103,16 +108,23 @@ class FamilyForm:
         """
         assert isinstance(case.structure, Family)
         decay, (sources, listeners, _) = self.decay(case), case.structure.union
-        y, added = driven(case, self.b, float(self.push or 0), None, self.after(case), t)
+        growth = self.growth or Fraction(0)
+        push = float((self.push or Fraction(0)) / _more(case, growth, self.b))
+        y, added = driven(case, self.b, push, None, self.after(case), t, growth)
         first, sizes = (
             np.array([[float_up(x)] for x in (values or [Fraction(0)] * len(self.nodes))])
             for values in (decay.away, None if self.sizes is None else [self.sizes[v] for v in self.nodes])
         )
-        standing = sizes * float_up(self.floor or Fraction(0))
+        standing = sizes * lasting(case, self.b, float_up(self.floor or Fraction(0)), t, growth)
         decaying, standing = (case.of_nodes(self.nodes, x) for x in (first * y + sizes * added, standing))
         alone = np.setdiff1d(np.arange(len(decaying)), np.concatenate([sources, listeners]))
         decaying[alone] = standing[alone] = 0
         return Moments(float(self.b), y, decaying, standing)
+
+    def stays(self, case: LateCase) -> bool:
+        """Whether what is left at ``T`` is never exceeded later: nothing is, or growth is slower than the decay then."""
+        left = self.initial * self.left or self.floor or self.push
+        return not left or case.exact.lasting(self.growth or Fraction(0), self.b) is not None
 
     def after(self, case: LateCase) -> float:
         """Return what disturbances add to the root at all times."""
@@ -189,13 +201,18 @@ def _bound(case: LateCase, component: FamilyComponent, V: Function, number: int)
             whole[v] = x
         initial = rounded(V.root([state[v] for v in chosen]), BITS, up=True)
         found = FamilyForm(number, tuple(chosen), q, b, kap, tuple(whole), initial, case.left(b))
-        yield found if case.messages.settles else _with_errors(case, found, tried)
+        with suppress(NoCertificate):
+            yield found if case.messages.settles else _with_errors(case, found, tried)
+
+
+def _more(case: LateCase, growth: Fraction, b: Fraction) -> Fraction:
+    """Return how much more of errors and disturbances stands where agents move by themselves."""
+    return case.exact.lasting(growth, b) or case.grown(growth)
 
 
 def _with_errors(case: LateCase, found: FamilyForm, tried: _Tried) -> FamilyForm:
-    """Add what errors of values and disturbances make of it."""
+    """Add what errors of values, disturbances and agents that move by themselves make of it."""
     disturbance = Fraction(0) if case.leaders is None else case.leaders.disturbance
-    wrong = case.messages.value_error + disturbance * case.messages.age
     V, n, more = tried.V, len(found.nodes), Fraction(1) + Fraction(_ROOM)
     own, unit = least(V.sizes)
 
@@ -204,9 +221,15 @@ def _with_errors(case: LateCase, found: FamilyForm, tried: _Tried) -> FamilyForm
         return tuple(by_node.get(v, Fraction(0)) for v in range(len(found.phi)))
 
     sizes = whole([rounded(Fraction(own.get(v, 0), unit) * more, BITS, up=True) for v in range(n)])
-    found = replace(found, sizes=sizes)
+    found, lasts = replace(found, sizes=sizes), Fraction(1)
+    if case.growth:
+        parting = {v: Fraction(own.get(v, 0), unit) * case.growth for v in range(n)}
+        growth = rounded(root_above(V.largest(parting)) * more, BITS, up=True)
+        found = replace(found, growth=growth, initial=rounded(found.initial * case.grown(growth), BITS, up=True))
+        lasts = _more(case, growth, found.b)
+    wrong = (case.messages.value_error + disturbance * case.messages.age) * lasts
     if disturbance:
-        push = root_above(V.largest(dict.fromkeys(range(n), disturbance)))
+        push = root_above(V.largest(dict.fromkeys(range(n), disturbance))) * lasts
         found = replace(found, push=rounded(push * more, BITS, up=True))
     if wrong:
         floor, psi = tried.errors(wrong)

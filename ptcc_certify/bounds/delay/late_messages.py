@@ -233,11 +233,14 @@ class LateBounds:
             return self.vehicles.after(self.case, self.rows)
         if self.forms:
             return self._after_by_forms
-        return min((float(row.residual(after=True).max()) for row in self.rows), default=None)
+        rows = [row for row in self.rows if row.stays(self.case)]
+        return min((float(row.residual(after=True).max()) for row in rows), default=None)
 
     @property
-    def _after_by_forms(self) -> float:
+    def _after_by_forms(self) -> float | None:
         """What bounds the same from ``T`` on by forms: what decays goes on to do so, what drives add grows."""
+        if not all(one.stays(self.case) for one in self.forms):
+            return None
         times = np.concatenate([[1.0], np.geomspace(1.001, 1e9, 200)]) * float(self.case.protocol.T)
         return float(self.largest_bound(times).max())
 
@@ -488,7 +491,7 @@ def messages_section(late: LateBounds) -> MessagesSection:
 def _form_section(one: FamilyForm) -> LateFamilyForm:
     """Return what a Lyapunov function of a family proves, as files have it."""
     sizes = None if one.sizes is None else Numbers(one.sizes)
-    told: dict[str, Any] = {"initial": one.initial, "left": one.left, "floor": one.floor, "push": one.push}
+    told = {key: getattr(one, key) for key in ("initial", "left", "floor", "push", "growth")}
     return LateFamilyForm(nodes=np.array(one.nodes), sizes=sizes, **told)
 
 
@@ -537,7 +540,7 @@ def _read_forms(case: LateCase, section: MessagesSection, proved: Any) -> Iterat
         witness, (q, b, kap) = step["witness"], (step[key] for key in ("q", "b", "kap"))
         nodes, phi = tuple(index[label] for label in entry.nodes), tuple(witness.phi)
         sizes, psi = (None if one is None else tuple(one) for one in (entry.sizes, witness.psi))
-        said = entry.initial, entry.left, entry.floor, entry.push, sizes, psi
+        said = entry.initial, entry.left, entry.floor, entry.push, sizes, psi, entry.growth
         yield FamilyForm(witness.function, nodes, q, b, kap, phi, *said)
 
 

@@ -29,7 +29,7 @@ def beside_law(certificate: Certificate) -> list[str]:
             told.append(f"Here messages are exact; {off}.")
         if messages.gain_cap is not None and messages.vehicles is None and not limits:
             limits = [Limits(gain_cap=messages.gain_cap)]
-    if leaders is not None and (leaders.total or leaders.sign_gain is not None):
+    if leaders is not None and not leaders.idle:
         rest = "leaders are at rest; of those that move was asked:"
         driven = "; followers then move by x_k' = u_k + d_k" if leaders.disturbance > 0 else ""
         what = rest if leaders.speed else "nothing disturbs; asked was:"

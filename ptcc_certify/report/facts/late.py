@@ -109,18 +109,18 @@ def _vehicles(certificate: Certificate, late: LateBounds) -> Facts:
 
 def _tracking(late: LateBounds, leaders: MovingLeaders, at: Fraction | None) -> Facts:
     """Tell how followers track leaders that move, of which they hear at once."""
-    head = "tracking" if leaders.total else "limited"  # where a cap is all that was asked
-    if leaders.total or leaders.sign_gain is not None:
+    head = "limited" if leaders.idle else "tracking"  # where a cap is all that was asked
+    if not leaders.idle:
         yield _pushed(late, leaders)
     if not late.says_something:
         yield Fact(head=head, standing="unproved", note=f"nothing is proved: {late.missing}", loud=True)
         return
-    protocol, after = late.case.protocol, late.after or 0.0
+    protocol, after = late.case.protocol, late.after
     if (cap := late.messages.gain_cap) is not None:
         yield Fact(head=head, note=f"gain <= {near(cap)}{': under a cap nothing settles' if late.largest else ''}")
     where = f"within {up(late.largest, 2)} of {late.goal}" if late.largest else f"on {late.goal}"
-    then = f"within {up(after, 2)} of it from then on" if after else "and ever after"
-    text = f"every {late.whose} {where} at T = {near(protocol.T)}, {then}"
+    then = "" if after is None else f", within {up(after, 2)} of it from then on" if after else ", and ever after"
+    text = f"every {late.whose} {where} at T = {near(protocol.T)}{then}"
     yield Fact(head=head, note=text, brief=(f"{text};",))
     instants = {"0.9 T": protocol.T * 9 / 10, "0.99 T": protocol.T * 99 / 100}
     if at is not None:
@@ -143,9 +143,11 @@ def _tracking(late: LateBounds, leaders: MovingLeaders, at: Fraction | None) -> 
 
 def _pushed(late: LateBounds, leaders: MovingLeaders) -> Fact:
     """Tell how fast leaders move, and what disturbs others; where leaders hear each other all who listen."""
-    if late.forms:
-        return Fact(head="disturbed", note=f"any |d_k| <= {near(leaders.disturbance)} of all who listen")
-    return Fact(head="leaders", note=leaders_text(leaders))
+    text = leaders_text(leaders)
+    if not late.forms:
+        return Fact(head="leaders", note=text)
+    note = text.removeprefix("at rest; ").replace("of followers", "of all who listen")
+    return Fact(head="agents" if leaders.growth else "disturbed", note=note)
 
 
 def leaders_text(leaders: MovingLeaders) -> str:
@@ -156,7 +158,12 @@ def leaders_text(leaders: MovingLeaders) -> str:
     >>> leaders_text(MovingLeaders(speed="0.5", disturbance=1))
     "speed |x_j'| <= 0.5; any |d_k| <= 1 of followers"
     """
-    clauses = [f"speed |x_j'| <= {near(leaders.speed)}" if leaders.speed else "at rest"]
+    speed = "|v_j|" if leaders.growth else "|x_j'|"
+    clauses = [f"speed {speed} <= {near(leaders.speed)}" if leaders.speed else "at rest"]
+    if leaders.growth:
+        own = f"x' = f(x) + {'v or ' if leaders.speed else ''}u, any odd f"
+        clauses[0] = f"{own} with |f(x) - f(y)| <= {near(leaders.growth)} |x - y|"
+        clauses += [f"leaders' speed {speed} <= {near(leaders.speed)}"] * bool(leaders.speed)
     if leaders.disturbance > 0:
         clauses.append(f"any |d_k| <= {near(leaders.disturbance)} of followers")
     if leaders.sign_gain is not None:

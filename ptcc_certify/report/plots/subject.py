@@ -161,6 +161,7 @@ def ideal_text(certificate: Certificate) -> str:
         "no limits": certificate.limits or (late is not None and late.messages.gain_cap is not None),
         without_flaws(None if late is None else late.messages): late is not None and not late.messages.exact,
         "leaders at rest": leaders is not None and leaders.speed > 0,
+        "no growth": leaders is not None and leaders.growth > 0,
         "no disturbances": leaders is not None and leaders.disturbance > 0,
     }
     return ", ".join(text for text, there in absent.items() if there)
@@ -177,8 +178,9 @@ def limits_text(run: Trajectory, certificate: Certificate | None) -> str:
     named = ["vehicles"] * run.vehicles
     named += [f"{name} {near(number)}" for name, number in numbers.items() if number]
     if leaders is not None:
-        values = leaders.speed, leaders.disturbance, leaders.sign_gain
-        words = dict(zip(("leaders move at up to", "disturbed by up to", "with sign(e) times"), values, strict=True))
+        values = leaders.speed, leaders.disturbance, leaders.sign_gain, leaders.growth
+        names = "leaders move at up to", "disturbed by up to", "with sign(e) times", "growth"
+        words = dict(zip(names, values, strict=True))
         named += [f"{name} {near(number)}" for name, number in words.items() if number]
     if certificate is not None:
         vehicles, late = run.vehicles, certificate.proof.late
