@@ -101,8 +101,8 @@ class RowBound:
         """Return the same of all agents, 0 of others than followers."""
         (y, added), u = self.decay(case, t), np.zeros((len(case.of.labels), 1))
         u[case.followers, 0] = self.witness.u
-        floor = lasting(case, self.witness.b, float(self.floor), t, case.growth)
-        return Moments(float(self.witness.b), y, u * (float(self.initial) * y + added), u * floor)
+        floor = lasting(case, self.witness.b, u * float(self.floor), t, case.growth)
+        return Moments(float(self.witness.b), y, u * (float(self.initial) * y + added), floor)
 
     def highest_floor(self, case: LateCase) -> Fraction:
         """Return what errors of values, leaders that move and disturbances add at most up to ``T``."""
@@ -162,9 +162,9 @@ def driven(
     return np.where(y > 0, y * np.exp(np.minimum(part * (t - T), _LARGEST_EXPONENT)), 0.0), added
 
 
-def lasting(case: LateCase, b: Fraction, floor: float, t: np.ndarray, growth: Fraction) -> np.ndarray:
-    """Return what errors add at instants, (M,) floats: after ``T`` infinite where growth outpaces the decay."""
-    lost = bool(floor) and case.exact.lasting(growth, b) is None
+def lasting(case: LateCase, b: Fraction, floor: np.ndarray, t: np.ndarray, growth: Fraction) -> np.ndarray:
+    """Return what errors add, (N, 1), at instants, (N, M): after ``T`` infinite where growth outpaces the decay."""
+    lost = (floor > 0) & (case.exact.lasting(growth, b) is None)
     return np.where((t > float(case.protocol.T)) & lost, np.inf, floor)
 
 

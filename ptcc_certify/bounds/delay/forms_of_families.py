@@ -115,7 +115,7 @@ class FamilyForm:
             np.array([[float_up(x)] for x in (values or [Fraction(0)] * len(self.nodes))])
             for values in (decay.away, None if self.sizes is None else [self.sizes[v] for v in self.nodes])
         )
-        standing = sizes * lasting(case, self.b, float_up(self.floor or Fraction(0)), t, growth)
+        standing = lasting(case, self.b, sizes * float_up(self.floor or Fraction(0)), t, growth)
         decaying, standing = (case.of_nodes(self.nodes, x) for x in (first * y + sizes * added, standing))
         alone = np.setdiff1d(np.arange(len(decaying)), np.concatenate([sources, listeners]))
         decaying[alone] = standing[alone] = 0
@@ -223,7 +223,7 @@ def _with_errors(case: LateCase, found: FamilyForm, tried: _Tried) -> FamilyForm
     sizes = whole([rounded(Fraction(own.get(v, 0), unit) * more, BITS, up=True) for v in range(n)])
     found, lasts = replace(found, sizes=sizes), Fraction(1)
     if case.growth:
-        parting = {v: Fraction(own.get(v, 0), unit) * case.growth for v in range(n)}
+        parting = {v: sizes[node] * case.growth for v, node in enumerate(found.nodes)}
         growth = rounded(root_above(V.largest(parting)) * more, BITS, up=True)
         found = replace(found, growth=growth, initial=rounded(found.initial * case.grown(growth), BITS, up=True))
         lasts = _more(case, growth, found.b)

@@ -1,0 +1,154 @@
+"""Agents that move by themselves, x' = f(t, x) + u: no run of any member, under any odd f, exceeds a bound."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from mutations import changed, resealed
+from schema_validator import VALIDATOR
+
+from ptcc_certify import read_certificate
+from ptcc_certify.certificate.certification import certify
+from ptcc_certify.checker import check
+from ptcc_certify.errors import HypothesisError, ParameterError
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.family import Family
+from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.model.agents import Agents
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.simulation.moving_leaders import simulate_tracking
+
+F = Fraction
+PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=4, kappa=1)
+CONVOY = SignedDigraph.from_edges([("L", "a", 1), ("a", "b", -1), ("b", "a", -1), ("b", "c", 1)])
+TEAM = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("b", "c", -1), ("c", "a", -1), ("c", "d", 2)])
+BEGIN = [2, 0, 1, 3]
+
+
+def drawn(rng: np.random.Generator, kind: str) -> tuple[Family, np.ndarray, np.ndarray]:
+    """A family of one to three modes, its camps, and by agent the pivot that it follows; -1 of those that end at 0."""
+    n, heads = int(rng.integers(2, 7)), 1
+    camp, home = rng.choice([-1, 1], n), np.zeros(n, dtype=int)
+    if kind == "led":
+        heads = int(rng.integers(1, 3))
+        n = max(n, heads + 1)
+        camp, home = rng.choice([-1, 1], n), np.concatenate([np.arange(heads), rng.integers(0, heads, n - heads)])
+    made = []
+    for _ in range(int(rng.integers(1, 4))):
+        rows = []
+        for v in range(heads if kind == "led" else 0, n):
+            sure = int(rng.choice([u for u in range(v) if home[u] == home[v]])) if v else n - 1
+            for u in range(n):
+                if u == v or home[u] != home[v] or (u != sure and rng.random() < 0.6):
+                    continue
+                low, share = F(int(rng.integers(2, 30)), 10), F(int(rng.integers(0, 4)), 10)
+                sign = int(camp[u] * camp[v])
+                rows.append((u, v, *sorted((sign * low, sign * low * (1 + share)))))
+        if kind == "repelled":  # an edge that no camps keep, in every member
+            sign = -int(camp[0] * camp[1])
+            rows = [row for row in rows if row[:2] not in ((0, 1), (1, 0))]
+            rows += [(0, 1, sign, sign), (1, 0, -sign, -sign)]
+        made.append(Family.from_intervals(rows, nodes=range(n)))
+    return Family.switching(made), camp, np.full(n, -1) if kind == "repelled" else home
+
+
+def own_motion(rng: np.random.Generator, growth: float) -> Callable[[float, np.ndarray], np.ndarray]:
+    """An odd function with this Lipschitz constant."""
+    size, width, turn = float(rng.choice([-1, 1])), float(rng.uniform(0.2, 3)), float(rng.uniform(3, 30))
+    return [
+        lambda t, x: growth * x,
+        lambda t, x: size * growth * width * np.sin(x / width),
+        lambda t, x: growth * math.copysign(1, math.sin(turn * t)) * x,
+        lambda t, x: growth * np.clip(x, -width, width),
+    ][int(rng.integers(4))]
+
+
+def run(
+    rng: np.random.Generator, family: Family, case: dict[str, Any], t: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """States ``(N, M)`` at instants and inputs, of weights, modes, disturbances, errors and speeds drawn at random."""
+    n, gap, x, f = family.n_nodes, case["cap"] or np.inf, np.array(case["begin"], dtype=float), case["f"]
+    boxes = []
+    for mode in family.modes:
+        ends = np.zeros((2, n, n))
+        for end, values in zip(ends, (mode.lower, mode.upper), strict=True):
+            sign = np.array(mode.sign, dtype=float)
+            end[mode.target, mode.source] = sign * [float(values.fraction(e)) for e in range(mode.source.size)]
+        boxes.append(ends)
+    hears = np.abs(np.array(boxes)).sum(axis=(0, 1, 3)) > 0
+    states, inputs, W, d, off = [x], [np.zeros(n)], boxes[0][0], np.zeros(n), np.zeros(n)
+    for i, (a, b) in enumerate(zip(t, t[1:], strict=False)):
+        if i % 40 == 0:
+            low, high = boxes[int(rng.integers(len(boxes)))]
+            W = low + (high - low) * rng.random((n, n))
+            d = np.where(hears, case["disturbance"], case["speed"]) * rng.choice([-1, 1], n)
+            off = case["error"] * np.abs(W).sum(axis=1) * rng.choice([-1, 1], n)
+        D = np.abs(W).sum(axis=1)
+
+        def speed(s: float, y: np.ndarray) -> np.ndarray:
+            gain = min(1 + 4 / (1 - s) if s < 1 else 1, gap)
+            return f(s, y) + d + gain * (W @ y - D * y + off)
+
+        h = b - a
+        k1 = speed(a, x)
+        k2, k3 = speed(a + h / 2, x + h / 2 * k1), np.zeros(n)
+        k3 = speed(a + h / 2, x + h / 2 * k2)
+        k4 = speed(b - 1e-15, x + h * k3)
+        x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        states.append(x)
+        inputs.append(min(1 + 4 / (1 - b) if b < 1 else 1, gap) * (W @ x - D * x + off))
+    return np.array(states).T, np.array(inputs).T
+
+
+def worst_ratio(kind: str, seed: int) -> float:
+    """The largest ratio of a run to what is certified of it: of deviations at all times, and of inputs."""
+    rng = np.random.default_rng([seed, len(kind)])
+    family, camp, pivot = drawn(rng, kind)
+    n, growth = family.n_nodes, F(int(rng.integers(1, 20)), 10)
+    forced = rng.random() < 0.5
+    speed, push = (F(int(rng.integers(1, 10)), 10) if forced else F(0) for _ in range(2))
+    leaders = MovingLeaders(speed if kind == "led" else 0, push, growth=growth)
+    error = F(1, 50) if rng.random() < 0.4 else F(0)
+    cap = F(int(rng.integers(3, 40))) if rng.random() < 0.5 else None
+    begin = [int(x) for x in rng.integers(-5, 6, n)]
+    told = LateMessages(value_error=error, gain_cap=cap, leaders=leaders)
+    made = certify(family, PROTOCOL, begin, messages=told, leaders=leaders, asks=Asks(simulation=False))
+    late = made.late
+    if not late.says_something:
+        return 0.0
+    assert made.verdict == "certified" and check(json.loads(made.to_json())).accepted
+    t = 1 - np.geomspace(1, 1e-3, 3000)
+    case = {"begin": begin, "cap": None if cap is None else float(cap), "error": float(error)}
+    case |= {"speed": float(leaders.speed), "disturbance": float(push), "f": own_motion(rng, float(growth))}
+    if cap is not None:
+        t = np.linspace(0, 1.5, 3000)
+    x, u = run(rng, family, case, t)
+    target = np.where(pivot[:, None] < 0, 0.0, (camp * camp[pivot])[:, None] * x[pivot])
+    bounds = [one.over_time(late.case, t).bound for one in (*late.rows, *late.of_all)]
+    bound = np.minimum.reduce(bounds) if not late.forms else np.maximum.reduce([np.nan_to_num(b, posinf=0) for b in bounds])
+    if late.forms:
+        beyond = np.logical_and.reduce([np.isinf(b) for b in bounds])
+        bound = np.where(beyond, np.inf, bound)
+    room = 1e-6 * (1 + np.abs(x).max())
+    worst = float((np.abs(x - target) / (bound + room)).max())
+    if late.inputs is not None:
+        heard, up_to_T = np.isfinite(late.inputs), t <= 1
+        own = np.abs(u[heard][:, up_to_T]).max(axis=1)
+        listens = np.isin(np.arange(n), np.concatenate([mode.target for mode in family.modes]))[heard]
+        worst = max(worst, float((own * listens / (late.inputs[heard] + 1e-6)).max(initial=0)))
+    return worst
+
+
+@pytest.mark.few(2)
+@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("kind", ["led", "agreed", "repelled"])
+def test_no_run_exceeds_a_bound(kind: str, seed: int):
+    assert worst_ratio(kind, seed) <= 1 + 1e-6
