@@ -45,7 +45,7 @@ from ptcc_certify.graphs.size_limits import (
     ONE_THREAD_NODES,
 )
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, analyse
-from ptcc_certify.lyapunov.follower_rows import leading_group, refuse_other_targets
+from ptcc_certify.lyapunov.follower_rows import leading_group, listeners, refuse_other_targets
 from ptcc_certify.model import Protocol
 from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.asks import Asks
@@ -264,7 +264,7 @@ def _refuse_uncarried(family: Family) -> None:
     """Refuse agents that move by themselves where some target is neither 0, a leader nor its opposite."""
     for component in decide(family):
         if component.behaviour not in (STABILITY, BIPARTITE_CONSENSUS):
-            one = shorten(component.family.labels[-1])
+            one = shorten(component.family.labels[int(listeners(component.family)[0])])
             why = "leave growth out, or let followers hear one leader, in ways that agree"
             raise HypothesisError(f"agents move by themselves, and not all targets about {one} are leaders: {why}")
 

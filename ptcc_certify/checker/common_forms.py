@@ -7,11 +7,11 @@ make of them at rest; in every mode ``xi' = -gain A xi`` with ``A = A_0 + sum_e 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 from lmi.exact.decimal_rounding import down
 from lmi.exact.definite import Arithmetic
@@ -149,11 +149,63 @@ class FamilyFunction:
         """Bound ``V`` of all states with ``|x_k| <= sizes_k``: ``b'|P| b``, ``b = |C| sizes``, by entries."""
         return self.value(sizes, sizes=True)
 
+    def spread(self, sizes: Mapping[int, Fraction]) -> Fraction | None:
+        """Bound how much faster ``sqrt(V)`` grows than agents that move by themselves part: see :func:`spread`."""
+        kernel, pivots = self.component.kernel, self.component.pivots
+        rows = [[kernel[v].get(j, 0) for j in pivots] for v in self.nodes]
+        return spread(self.matrix, self.scale, rows, [sizes[v] for v in self.nodes])
+
     def value(self, x: Sequence[Fraction] | Mapping[int, Fraction], sizes: bool = False) -> Fraction:
         """Return ``V`` of a state, or of sizes the largest one."""
         xi, unit = self.component.coordinates(self.nodes, x, sizes)
         spend(len(xi) ** 2, longest(xi), longest(max(row, key=abs) for row in self.matrix), "a Lyapunov function")
         return Fraction(quadratic(self.matrix, xi, sizes), self.scale * unit**2)
+
+
+def spread(
+    matrix: Sequence[Sequence[Any]], scale: int, kernel: Sequence[Sequence[Any]], sizes: Iterable[Fraction]
+) -> Fraction | None:
+    """Bound how much faster the root of a form grows than its agents part, if they move by themselves.
+
+    ``V`` is a sum of ``c_kl (x_k - x_l)^2`` of pairs in one camp, or where all end at 0 of ``c_kl (x_k +- x_l)^2`` and
+    ``c_k x_k^2``. An odd ``f`` with the constant ``l`` lets no square grow faster than ``2 l`` times itself, nor fall
+    faster: so ``V' <= 2 l (V + 2 N)``, ``N`` the terms with ``c < 0`` in size, by ``|xi_k| <= sizes_k sqrt(V)``.
+
+    Parameters
+    ----------
+    matrix, scale : n rows of n integers, int
+        ``P = matrix/scale``.
+    kernel : n rows
+        Of the coordinates: 1 or -1 at the one pivot; without pivots they are empty.
+    sizes : n Fraction
+
+    Returns
+    -------
+    Fraction or None
+        ``1 + 2 N/V``; None of other kernels.
+
+    Examples
+    --------
+    >>> sizes = [Fraction(1)] * 2
+    >>> spread([[2, -1], [-1, 2]], 1, [[1], [1]], sizes), spread([[2, 1], [1, 2]], 1, [[1], [1]], sizes)
+    (Fraction(1, 1), Fraction(9, 1))
+    >>> spread([[1, 2], [2, 5]], 1, [[], []], sizes)
+    Fraction(3, 1)
+    """
+    own, n, terms = list(sizes), len(matrix), list[Fraction]()
+    spend(4 * n * n, longest(max(row, key=abs) for row in matrix), longest(x.numerator for x in own) + 64, "growth")
+    if not any(kernel):
+        for k, (row, size) in enumerate(zip(matrix, own, strict=True)):
+            terms.append((sum(map(abs, row)) - 2 * row[k]) * size**2)
+    elif all(len(row) == 1 and abs(row[0]) == 1 for row in kernel):
+        camps = [int(row[0]) for row in kernel]
+        for k, (row, size) in enumerate(zip(matrix, own, strict=True)):
+            coupled = [camps[k] * camp * x for camp, x in zip(camps, row, strict=True)]
+            terms.append(-sum(coupled) * size**2)
+            terms += [x * (size + other) ** 2 for x, other in zip(coupled[:k], own, strict=False)]
+    else:
+        return None
+    return 1 + 2 * sum((x for x in terms if x > 0), Fraction(0)) / scale
 
 
 def check_form(doc: Document, family: Family, component: Component, entry: FormSection, of: str) -> FamilyFunction:

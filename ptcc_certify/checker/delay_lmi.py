@@ -39,7 +39,7 @@ from ptcc_certify.checker.graph import proved_above
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.input_formulas import BITS, root_above
 from ptcc_certify.checker.matrix_products import Matrix, Sparse, need_rows, quadratic, times
-from ptcc_certify.checker.message_ages import PARTS, Messages
+from ptcc_certify.checker.message_ages import LARGEST_GROWTH, PARTS, Messages
 from ptcc_certify.checker.reading import RejectedError, length, need
 from ptcc_certify.checker.section_declarations import FewAgents, NotNegative, Several, Triangle
 from ptcc_certify.checker.stated_bounds import DecayOfAll

@@ -34,7 +34,14 @@ from ptcc_certify.checker.stated_bounds import DecayOfAll
 Edge = tuple[int, int, Fraction]
 
 
-class FunctionOfSignals(Function, Protocol):
+class SpreadingFunction(Function, Protocol):
+    """A Lyapunov function of which is known how fast it grows where agents move by themselves."""
+
+    def spread(self, sizes: Sizes) -> Fraction | None:
+        """Bound how much faster ``sqrt(V)`` grows than agents part by themselves; None if that is not known."""
+
+
+class FunctionOfSignals(SpreadingFunction, Protocol):
     """A Lyapunov function of a component of a family."""
 
     @property
@@ -172,13 +179,16 @@ class _FormUnderDelays:
     def _grown(self, entry: LateFamilyForm, b: Fraction) -> tuple[Fraction, Fraction]:
         """Verify how fast ``sqrt(V)`` may grow as agents move by themselves.
 
-        Return by how much more it has grown by ``T``, and how much more stands of what drives it. In their coordinates agents part at no more than ``growth |xi_k| <= growth size_k sqrt(V)``.
+        Return by how much more it has grown by ``T``, and how much more stands of what drives it. In their coordinates
+        agents part at no more than ``growth |xi_k| <= growth size_k sqrt(V)``.
         """
         if entry.growth is None or entry.sizes is None:
             return Fraction(1), Fraction(1)
         pivots, growth = set(self.V.component.pivots.values()), self.messages.growth
-        parting = {v: Fraction(0) if v in pivots else growth * entry.sizes[v] for v in self.nodes}
-        need(entry.growth**2 >= self.V.largest(parting), "growth is too small")
+        sizes = {v: Fraction(0) if v in pivots else entry.sizes[v] for v in self.nodes}
+        share = self.V.spread(sizes)
+        known = share is not None and entry.growth >= growth * share
+        need(known or entry.growth**2 >= growth**2 * self.V.largest(sizes), "growth is too small")
         grown = self.messages.grown(entry.growth)
         return grown, self.messages.lasting(entry.growth, b) or grown
 

@@ -33,14 +33,14 @@ class Moving:
         Of every leader, and of every follower, at most.
     sign_gain : Fraction or None
         What followers add times ``sign(e_k)``: at least the sum of these.
-    growth : Fraction
-        The Lipschitz constant of what all agents do by themselves, which is odd.
+    growth : Fraction or None
+        The Lipschitz constant of what all agents do by themselves, which is odd; None if that is nothing.
     """
 
     speed: NotNegative
     disturbance: NotNegative
     sign_gain: Fraction | None = None
-    growth: NotNegative = Fraction(0)
+    growth: Positive | None = None
 
     @property
     def push(self) -> Fraction:
@@ -103,7 +103,7 @@ class Messages:
     @property
     def growth(self) -> Fraction:
         """At what rate what agents do by themselves parts two of them, at most."""
-        return Fraction(0) if self.leaders is None else self.leaders.growth
+        return (None if self.leaders is None else self.leaders.growth) or Fraction(0)
 
     def grown(self, growth: Fraction) -> Fraction:
         """Bound ``e^(growth T)`` from above: by so much more is left of anything at ``T`` than without growth.

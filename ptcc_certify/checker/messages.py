@@ -202,7 +202,12 @@ def _check_rows(
 
 
 def _drift(
-    messages: Messages, leaders: Moving, rows: Rows, b: Fraction, limit: Fraction | None, entry: RowsBound,
+    messages: Messages,
+    leaders: Moving,
+    rows: Rows,
+    b: Fraction,
+    limit: Fraction | None,
+    entry: RowsBound,
     more: Fraction,
 ) -> tuple[Fraction, Fraction]:
     """Verify what leaders that move, and disturbances, add at ``T``, and at all times: ``more`` of it stands."""

@@ -116,6 +116,10 @@ class FollowerFunction:
         roots += [part.function.root(x) / part.times for part in self.parts]
         return rounded(max(roots), BITS, up=True)
 
+    def spread(self, sizes: Mapping[int, Fraction]) -> Fraction | None:
+        """Return 1, a weighted maximum, if followers hear no groups; None otherwise."""
+        return None if self.parts else Fraction(1)
+
     def largest(self, sizes: Mapping[int, Fraction]) -> Fraction:
         """Bound ``W^2`` of all states with ``|x_k| <= sizes_k``, rounded up."""
         xi, unit = self.component.coordinates(list(self.vector), sizes, sizes=True)

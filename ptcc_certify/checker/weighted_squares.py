@@ -141,6 +141,10 @@ class WeightedSquares:
         """Return the largest ``V`` of all states with ``|x_k| <= sizes_k``."""
         return self._value(sizes)
 
+    def spread(self, sizes: Mapping[int, Fraction]) -> Fraction | None:
+        """Return 1: ``sqrt(V)`` grows no faster than agents that move by themselves part."""
+        return Fraction(1)
+
     def _value(self, x: Sequence[Fraction] | Mapping[int, Fraction]) -> Fraction:
         (whole,), scale = integers([[x[v] for v in self.weights]])
         bits = longest(whole)

@@ -17,7 +17,7 @@ import numpy as np
 from lmi.definiteness_proofs import prove_generalized_margin
 from lmi.exact import arithmetic
 from lmi.exact.numbers import integers
-from ptcc_certify.checker.common_forms import Scaled
+from ptcc_certify.checker.common_forms import Scaled, spread
 from ptcc_certify.checker.common_kernel_ends import WeightedMean
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.lyapunov.quotient import Quotient, QuotientMode
@@ -109,6 +109,11 @@ class CommonForm:
         own = self.quotient.coordinate_sizes(sizes)
         rows = (sum((abs(p) * b for p, b in zip(row, own, strict=True)), Fraction(0)) for row in self.matrix)
         return sum((b * total for b, total in zip(own, rows, strict=True)), Fraction(0))
+
+    def spread(self, sizes: Mapping[int, Fraction]) -> Fraction | None:
+        """Bound how much faster ``sqrt(V)`` grows than agents that move by themselves part."""
+        whole, scale = integers(self.matrix)
+        return spread(whole, scale, [self.quotient.basis[v] for v in self.nodes], [sizes[v] for v in self.nodes])
 
     def value(self, xi: Sequence[Fraction]) -> Fraction:
         """Return ``V`` of quotient coordinates."""

@@ -166,6 +166,10 @@ class FollowerFunction:
             roots.append(part.function.root([x[v] for v in part.agents.tolist()]) / part.times)
         return rounded(max(roots), ROOT_BITS, up=True)
 
+    def spread(self, sizes: Mapping[int, Fraction]) -> Fraction | None:
+        """Return 1, a weighted maximum, if followers hear no groups; None otherwise."""
+        return None if self.parts else Fraction(1)
+
     def largest(self, sizes: Mapping[int, Fraction]) -> Fraction:
         """Bound ``W^2`` of all states with ``|x_k| <= sizes_k``, rounded up to 64 bits."""
         (whole,), scale = integers([[sizes[v] for v in range(self.family.n_nodes)]])

@@ -33,8 +33,8 @@ class MovingLeaders(Parameters):
     sign_gain : number or str, optional
         What followers add times ``sign(e_k)``, at least ``speed + disturbance``: they stay on their targets after
         ``T``. Without it they are there at ``T``.
-    growth : number or str
-        The Lipschitz constant of ``f``, not negative, 1/time.
+    growth : number or str, optional
+        The Lipschitz constant of ``f``, positive, 1/time; without it ``f = 0``.
 
     Raises
     ------
@@ -70,10 +70,10 @@ give 2 or more
         Given(),
         unit="state/time",
     )
-    growth: NotNegative = option(
+    growth: Given = option(
         "--growth L",
         "Agents move by themselves, too: x' = f(x) + u, any odd f with |f(x) - f(y)| <= L |x - y|.",
-        NotNegative(0),
+        Given(),
         example="0.3",
         unit="1/time",
     )

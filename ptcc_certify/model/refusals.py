@@ -97,7 +97,7 @@ def asked_of_signals(structure: Structure, case: Case) -> bool:
     if messages is None or case.sliding or (groups and not messages.at_rest):
         return False
     if messages.leaders is not None:
-        return groups or messages.leaders.growth > 0
+        return groups or messages.leaders.growth is not None
     return groups and messages.value_error > 0 and messages.gain_cap is None
 
 
@@ -163,7 +163,7 @@ it out
     asked |= {
         "delta": asked["delta"] or (leaders is not None and leaders.disturbance > 0),
         "sign_gain": leaders is not None and leaders.sign_gain is not None,
-        "growth": leaders is not None and leaders.growth > 0,
+        "growth": leaders is not None and leaders.growth is not None,
         "own_delay": messages is not None and messages.own_delay,
     }
     if name := next((name for name, given in asked.items() if given), None):

@@ -87,7 +87,7 @@ class WorstLeaders:
         except np.linalg.LinAlgError:
             raise ParameterError("the weights lie too far apart for a run: floats lose who follows whom") from None
         self.speed, self.delta, self.growth = (
-            float(x) for x in (leaders.speed, leaders.disturbance, leaders.growth)
+            float(x or 0) for x in (leaders.speed, leaders.disturbance, leaders.growth)
         )
         try:
             self.weights = np.ones(F.size) if u is None else np.asarray(u, dtype=float)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from collections.abc import Callable
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mutations import changed, resealed
+from oracle import number
 from schema_validator import VALIDATOR
 
 from ptcc_certify import read_certificate
@@ -71,12 +73,14 @@ def own_motion(rng: np.random.Generator, growth: float) -> Callable[[float, np.n
     ][int(rng.integers(4))]
 
 
-def run(
-    rng: np.random.Generator, family: Family, case: dict[str, Any], t: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def run(rng: np.random.Generator, family: Family, case: dict[str, Any], t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """States ``(N, M)`` at instants and inputs, of weights, modes, disturbances, errors and speeds drawn at random."""
     n, gap, x, f = family.n_nodes, case["cap"] or np.inf, np.array(case["begin"], dtype=float), case["f"]
     boxes = []
+
+    def gain(s: float) -> float:
+        return min(1 + 4 / (1 - s) if s < 1 else 1, gap)
+
     for mode in family.modes:
         ends = np.zeros((2, n, n))
         for end, values in zip(ends, (mode.lower, mode.upper), strict=True):
@@ -85,7 +89,7 @@ def run(
         boxes.append(ends)
     hears = np.abs(np.array(boxes)).sum(axis=(0, 1, 3)) > 0
     states, inputs, W, d, off = [x], [np.zeros(n)], boxes[0][0], np.zeros(n), np.zeros(n)
-    for i, (a, b) in enumerate(zip(t, t[1:], strict=False)):
+    for i, (a, b) in enumerate(itertools.pairwise(t)):
         if i % 40 == 0:
             low, high = boxes[int(rng.integers(len(boxes)))]
             W = low + (high - low) * rng.random((n, n))
@@ -93,18 +97,18 @@ def run(
             off = case["error"] * np.abs(W).sum(axis=1) * rng.choice([-1, 1], n)
         D = np.abs(W).sum(axis=1)
 
-        def speed(s: float, y: np.ndarray) -> np.ndarray:
-            gain = min(1 + 4 / (1 - s) if s < 1 else 1, gap)
-            return f(s, y) + d + gain * (W @ y - D * y + off)
+        def speed(
+            s: float, y: np.ndarray, W: np.ndarray = W, D: np.ndarray = D, d: np.ndarray = d, off: np.ndarray = off
+        ) -> np.ndarray:
+            return f(s, y) + d + gain(s) * (W @ y - D * y + off)
 
         h = b - a
         k1 = speed(a, x)
-        k2, k3 = speed(a + h / 2, x + h / 2 * k1), np.zeros(n)
+        k2 = speed(a + h / 2, x + h / 2 * k1)
         k3 = speed(a + h / 2, x + h / 2 * k2)
-        k4 = speed(b - 1e-15, x + h * k3)
-        x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + speed(b - 1e-15, x + h * k3))
         states.append(x)
-        inputs.append(min(1 + 4 / (1 - b) if b < 1 else 1, gap) * (W @ x - D * x + off))
+        inputs.append(gain(b) * (W @ x - D * x + off))
     return np.array(states).T, np.array(inputs).T
 
 
@@ -132,11 +136,9 @@ def worst_ratio(kind: str, seed: int) -> float:
         t = np.linspace(0, 1.5, 3000)
     x, u = run(rng, family, case, t)
     target = np.where(pivot[:, None] < 0, 0.0, (camp * camp[pivot])[:, None] * x[pivot])
-    bounds = [one.over_time(late.case, t).bound for one in (*late.rows, *late.of_all)]
-    bound = np.minimum.reduce(bounds) if not late.forms else np.maximum.reduce([np.nan_to_num(b, posinf=0) for b in bounds])
-    if late.forms:
-        beyond = np.logical_and.reduce([np.isinf(b) for b in bounds])
-        bound = np.where(beyond, np.inf, bound)
+    each = [one.over_time(late.case, t).bound for one in (*late.rows, *late.of_all)]
+    bound = np.minimum.reduce(each)  # of forms, one of which knows each agent
+    assert np.isfinite(bound[:, t < 1]).all()
     room = 1e-6 * (1 + np.abs(x).max())
     worst = float((np.abs(x - target) / (bound + room)).max())
     if late.inputs is not None:
@@ -152,3 +154,107 @@ def worst_ratio(kind: str, seed: int) -> float:
 @pytest.mark.parametrize("kind", ["led", "agreed", "repelled"])
 def test_no_run_exceeds_a_bound(kind: str, seed: int):
     assert worst_ratio(kind, seed) <= 1 + 1e-6
+
+
+def test_one_pair_by_hand():
+    """Two agents, one leader: x_b - x_a is multiplied by e^(l t) (1 - t) e^-t, and the bound is that."""
+    pair = SignedDigraph.from_edges([("a", "b", 1)])
+    leaders = MovingLeaders(speed=0, growth=F(1, 2))
+    late = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [0, 3], leaders=leaders).late
+    t = np.array([0, 0.3, 0.9])
+    assert late.deviation_bound(t)[0] == pytest.approx(3 * np.exp(t / 2) * (1 - t) * np.exp(-t), rel=1e-6)
+    assert late.largest == 0
+
+
+@pytest.mark.parametrize("cap", [None, 20])
+@pytest.mark.parametrize("speed", [0, F(1, 2)])
+def test_the_run_of_leaders_that_move_by_themselves_is_on_the_bound(speed: Fraction, cap: int | None):
+    leaders = MovingLeaders(speed, growth=1)
+    late = certify(CONVOY, PROTOCOL, BEGIN, messages=LateMessages(leaders=leaders, gain_cap=cap)).late
+    made = simulate_tracking(CONVOY, PROTOCOL, leaders, BEGIN, u=late.rows[0].witness.u, gain_cap=cap)
+    off, bound = np.abs(made.states - made.targets)[late.followers], late.deviation_bound(made.t)
+    assert (off <= bound * (1 + 1e-9) + 1e-9).all()
+    assert made.states[0, -1] > 2 * math.exp(1)
+
+
+# ---------------------------------------------------------------------- files
+
+
+def document(graph: Any, **parts: Any) -> dict[str, Any]:
+    made = certify(graph, PROTOCOL, BEGIN, asks=Asks(simulation=False), **parts)
+    return {**json.loads(made.to_json()), "unverified": {}}
+
+
+def asked(growth: Any = "0.3", **parts: Any) -> dict[str, Any]:
+    leaders = MovingLeaders(**{"speed": 0, "disturbance": "0.1", **parts}, growth=growth)
+    return {"messages": LateMessages(value_error="0.01", gain_cap=20, leaders=leaders)}
+
+
+@pytest.mark.parametrize("graph", [CONVOY, TEAM], ids=["rows", "forms"])
+def test_it_is_checked_with_and_without_arrays_and_read_back(graph: SignedDigraph, tmp_path):
+    made = certify(graph, PROTOCOL, BEGIN, **asked())
+    data = json.loads(made.to_json())
+    assert VALIDATOR.is_valid(data) and data["messages"]["leaders"]["growth"] == "3/10"
+    assert all(check(data, stdlib=one).accepted for one in (False, True))
+    made.save(tmp_path / "c.json")
+    again, t = read_certificate(tmp_path / "c.json").late, np.array([0, 0.5, 1, 1.2])
+    assert again.leaders == made.late.leaders and again.largest == made.late.largest
+    assert np.array_equal(again.largest_bound(t), made.late.largest_bound(t))
+
+
+@pytest.mark.parametrize(
+    ("graph", "name", "why"),
+    [
+        (CONVOY, "initial", "starts farther"),
+        (CONVOY, "floor", "heard wrong"),
+        (CONVOY, "drift", "drift is not proved"),
+        (CONVOY, "after", "pushed farther"),
+        (TEAM, "initial", "initial is not proved"),
+        (TEAM, "push", "push is too small"),
+        (TEAM, "floor", "is too small"),
+        (TEAM, "growth", "growth is too small"),
+    ],
+)
+def test_nothing_is_accepted_without_what_growth_multiplies(graph: SignedDigraph, name: str, why: str):
+    data, key = document(graph, **asked()), "rows" if graph is CONVOY else "forms"
+    less = number(data["messages"][key][0][name]) * F(5, 6)  # e^(growth T) is 1.35
+    report = check(resealed(changed(data, ("messages", key, 0, name), str(less))))
+    assert not report.accepted and why in report.reason, report.reason
+
+
+def test_growth_of_one_graph_or_of_other_targets_is_not_accepted():
+    plain = certify(CONVOY, PROTOCOL, BEGIN, leaders=MovingLeaders(speed=1), asks=Asks(simulation=False))
+    data = changed(json.loads(plain.to_json()), ("messages", "leaders", "growth"), "1/100")
+    assert "move by themselves" in check(resealed(data)).reason
+    two = {"day": [("L", "a", 1), ("M", "a", 1)], "night": [("L", "a", 2), ("M", "a", 2)]}
+    made = certify(two, PROTOCOL, [1, 2, 3], leaders=MovingLeaders(speed=1))
+    data = changed(json.loads(made.to_json()), ("messages", "leaders", "growth"), "1/100")
+    assert "neither 0, a leader nor its opposite" in check(resealed(data)).reason
+
+
+@pytest.mark.parametrize(
+    ("graph", "parts", "why"),
+    [
+        ([("L", "a", 1), ("M", "a", 1)], {}, "not all targets about a are leaders"),
+        (CONVOY, {"messages": LateMessages("0.1")}, "goes on while messages come"),
+        (CONVOY, {"agents": Agents(order=2, exchange="virtual")}, "virtual positions"),
+        (CONVOY, {"asks": Asks(initial_set=1)}, "initial_set"),
+        (TEAM, {"leaders": MovingLeaders(1, growth=1)}, "a and b are leaders of one group"),
+        (CONVOY, {"protocol": SlidingModeProtocol(1, 1, 1, 1, 1, 2, 1, 1, 1)}, "nominal protocol"),
+    ],
+)
+def test_what_is_not_proved_is_refused_in_one_line(graph: Any, parts: dict[str, Any], why: str):
+    parts = {"leaders": MovingLeaders(0, growth="0.3"), **parts}
+    with pytest.raises((ParameterError, HypothesisError), match=why):
+        certify(graph, parts.pop("protocol", PROTOCOL), **parts)
+
+
+def test_a_target_that_moves_by_itself_is_heard_late():
+    """Why late messages are refused beside growth: however fast it decays, the follower stays behind."""
+    growth, delay, dt = 0.5, 0.1, 1e-4
+    heard, x, steps = [1.0], 1.0, int(0.9 / dt)
+    for i in range(steps):
+        old = heard[max(0, len(heard) - 1 - round(delay / dt))]
+        x += dt * (growth * x + 200 * (old - x))
+        heard.append(math.exp(growth * (i + 1) * dt))
+    assert abs(x - heard[-1]) > 0.8 * growth * delay * heard[-1]

@@ -76,7 +76,7 @@ class RowBound:
     after: Fraction | None = None
 
     def stays(self, case: LateCase) -> bool:
-        """Whether what is left at ``T`` is never exceeded later: nothing is, or growth is slower than the decay then."""
+        """Whether what is left at ``T`` is never exceeded: nothing is, or growth is slower than the decay then."""
         left = self.initial * self.left or self.floor or self.after
         return not left or case.exact.lasting(case.growth, self.witness.b) is not None
 
@@ -311,8 +311,8 @@ def row_bound(case: LateCase, rows: FollowerRows, first: np.ndarray, witness: Ro
     grown = case.grown(case.growth)
     more = case.exact.lasting(case.growth, witness.b) or grown
     initial = Fraction(float((first / witness.u).max()) * MORE) * grown
-    floor = Fraction(floor * MORE) * more
-    row = RowBound(witness, cap, case.clock(cap), case.left(witness.b, cap), initial, floor)
+    stands = Fraction(floor * MORE) * more
+    row = RowBound(witness, cap, case.clock(cap), case.left(witness.b, cap), initial, stands)
     if case.leaders is None:
         return row
     push = case.push / Fraction(float(witness.u.min())) * grown

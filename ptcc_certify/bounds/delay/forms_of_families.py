@@ -33,9 +33,9 @@ from lmi.exact.decimal_rounding import float_up
 from lmi.exact.elementary_enclosures import exp, rounded
 from ptcc_certify.bounds.delay.case import LateCase, Moments
 from ptcc_certify.bounds.delay.decay_by_rows import driven, lasting
-from ptcc_certify.checker.forms_of_families import Edge, heard_in_mode
+from ptcc_certify.checker.forms_of_families import Edge, SpreadingFunction, heard_in_mode
 from ptcc_certify.checker.input_formulas import BITS, drift_above, root_above
-from ptcc_certify.checker.signal_bounds import Function, least
+from ptcc_certify.checker.signal_bounds import least
 from ptcc_certify.checker.stated_bounds import DecayOfAll
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
@@ -122,7 +122,7 @@ class FamilyForm:
         return Moments(float(self.b), y, decaying, standing)
 
     def stays(self, case: LateCase) -> bool:
-        """Whether what is left at ``T`` is never exceeded later: nothing is, or growth is slower than the decay then."""
+        """Whether what is left at ``T`` is never exceeded: nothing is, or growth is slower than the decay then."""
         left = self.initial * self.left or self.floor or self.push
         return not left or case.exact.lasting(self.growth or Fraction(0), self.b) is not None
 
@@ -132,7 +132,7 @@ class FamilyForm:
 
 
 def forms_of_family(
-    case: LateCase, parts: Sequence[tuple[FamilyComponent, Sequence[Function]]]
+    case: LateCase, parts: Sequence[tuple[FamilyComponent, Sequence[SpreadingFunction]]]
 ) -> tuple[FamilyForm, ...]:
     """Return what leaves least at ``T`` of every component in which somebody listens; none if one has nothing.
 
@@ -140,7 +140,7 @@ def forms_of_family(
     ----------
     case : LateCase
         Of a family; of late messages with a cap of the gain. Without an initial state there are none.
-    parts : sequence of (FamilyComponent, sequence of Function)
+    parts : sequence of (FamilyComponent, sequence of SpreadingFunction)
         Every component with its functions, in the order in which files number them.
     """
     found, number = [], 0
@@ -158,7 +158,9 @@ def forms_of_family(
     return tuple(found)
 
 
-def longest_delay_of_family(case: LateCase, parts: Sequence[tuple[FamilyComponent, Sequence[Function]]]) -> float:
+def longest_delay_of_family(
+    case: LateCase, parts: Sequence[tuple[FamilyComponent, Sequence[SpreadingFunction]]]
+) -> float:
     """Return about the longest delay that functions of a family forgive: this certificate's limit, not the loop's."""
     longest = math.inf
     for component, functions in parts:
@@ -187,7 +189,7 @@ def _cost(found: FamilyForm) -> tuple[float, float]:
     return most / float(found.b) * float(found.left) + rest * stays, most
 
 
-def _bound(case: LateCase, component: FamilyComponent, V: Function, number: int) -> Iterator[FamilyForm]:
+def _bound(case: LateCase, component: FamilyComponent, V: SpreadingFunction, number: int) -> Iterator[FamilyForm]:
     """Yield what one function proves; nothing if it does not forgive this delay."""
     rate, late = V.rate / 2, (case.messages.gain_cap or Fraction(0)) * case.messages.age
     if not rate > 0 or (late and component.nodes.size > LARGEST):
@@ -223,8 +225,9 @@ def _with_errors(case: LateCase, found: FamilyForm, tried: _Tried) -> FamilyForm
     sizes = whole([rounded(Fraction(own.get(v, 0), unit) * more, BITS, up=True) for v in range(n)])
     found, lasts = replace(found, sizes=sizes), Fraction(1)
     if case.growth:
-        parting = {v: sizes[node] * case.growth for v, node in enumerate(found.nodes)}
-        growth = rounded(root_above(V.largest(parting)) * more, BITS, up=True)
+        own_sizes = {v: sizes[node] for v, node in enumerate(found.nodes)}
+        shares = (root_above(V.largest(own_sizes)), V.spread(own_sizes))
+        growth = rounded(case.growth * min(x for x in shares if x is not None) * more, BITS, up=True)
         found = replace(found, growth=growth, initial=rounded(found.initial * case.grown(growth), BITS, up=True))
         lasts = _more(case, growth, found.b)
     wrong = (case.messages.value_error + disturbance * case.messages.age) * lasts
@@ -247,13 +250,13 @@ def _edges(mode: Mode) -> list[Edge]:
 class _Tried:
     """A function, ``c``, the edges of every mode, and ``h``."""
 
-    V: Function
+    V: SpreadingFunction
     first: Sequence[Fraction]
     modes: Sequence[Sequence[Edge]]
     late: Fraction
 
     @classmethod
-    def of(cls, component: FamilyComponent, V: Function, late: Fraction) -> _Tried:
+    def of(cls, component: FamilyComponent, V: SpreadingFunction, late: Fraction) -> _Tried:
         """Return a function of a component under so much lateness on the clock."""
         speeds, unit = least(V.speeds)
         first = [Fraction(speeds.get(v, 0), unit) * (1 + Fraction(_MORE)) for v in range(component.nodes.size)]

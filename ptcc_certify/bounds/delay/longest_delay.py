@@ -19,7 +19,7 @@ from ptcc_certify.bounds.delay.forms_of_families import forms_of_family, longest
 from ptcc_certify.bounds.delay.late_messages import LateBounds, bound_late
 from ptcc_certify.bounds.delay.small_delays import SmallDelayBounds
 from ptcc_certify.bounds.virtual_positions import vehicles_of_all
-from ptcc_certify.checker.signal_bounds import Function
+from ptcc_certify.checker.forms_of_families import SpreadingFunction
 from ptcc_certify.checker.stated_bounds import DecayOfAll
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
 
@@ -57,7 +57,9 @@ def with_forms(late: LateBounds) -> LateBounds:
     return _with_decays(replace(late, of_all=bounds), decays)
 
 
-def with_forms_of_family(late: LateBounds, parts: Sequence[tuple[FamilyComponent, Sequence[Function]]]) -> LateBounds:
+def with_forms_of_family(
+    late: LateBounds, parts: Sequence[tuple[FamilyComponent, Sequence[SpreadingFunction]]]
+) -> LateBounds:
     """Add what Lyapunov functions of a family prove, where it has groups of leaders."""
     forms = forms_of_family(late.case, parts)
     if late.messages.age:

@@ -61,7 +61,7 @@ def assumptions(certificate: Certificate, states: bool = False) -> list[str]:
         "without a gain cap": not limits and messages is not None and messages.gain_cap is not None,
         without_flaws(messages): messages is not None and not messages.exact,
         "leaders at rest": leaders is not None and leaders.speed > 0,
-        "without growth": leaders is not None and leaders.growth > 0,
+        "without growth": leaders is not None and leaders.growth is not None,
         "without disturbances": leaders is not None and leaders.disturbance > 0,
         "without sign(e_k)": leaders is not None and leaders.sign_gain is not None,
     }

@@ -161,7 +161,7 @@ def ideal_text(certificate: Certificate) -> str:
         "no limits": certificate.limits or (late is not None and late.messages.gain_cap is not None),
         without_flaws(None if late is None else late.messages): late is not None and not late.messages.exact,
         "leaders at rest": leaders is not None and leaders.speed > 0,
-        "no growth": leaders is not None and leaders.growth > 0,
+        "no growth": leaders is not None and leaders.growth is not None,
         "no disturbances": leaders is not None and leaders.disturbance > 0,
     }
     return ", ".join(text for text, there in absent.items() if there)
