@@ -101,6 +101,7 @@ def check_messages(
     if messages.growth:
         carried = isinstance(of, Family) and all(one.carried for one in of.components)
         need(carried, "agents that move by themselves to targets that are neither 0, a leader nor its opposite")
+        need("formation" not in doc, "agents that move by themselves in a formation")
     need(len(section.rows) <= MANY_ROWS, f"more than {MANY_ROWS} witnesses of rows")
     by_rows = bool(section.rows) or section.steps is not None
     bounded = by_rows or section.forms is not None

@@ -59,7 +59,7 @@ give 2 or more
     speed: NotNegative = option(
         "--leader-speed V",
         "Leaders move, as fast as V: how followers track them.",
-        NotNegative(),
+        NotNegative(0),
         example="0.5",
         unit="state/time",
     )

@@ -111,6 +111,8 @@ def refuse_of_families(case: Case) -> None:
         given.remove("agents")  # in a formation
         if case.agents.biases is not None:
             raise ParameterError("biases", "of a family make other places in every graph; give offsets instead")
+        if case.leaders is not None and case.leaders.growth is not None:
+            raise ParameterError("growth", "at other places moves agents otherwise; leave it or the formation out")
     if given:
         mend = {"limits": "families take one gain cap alone; leave others out", "delta": _NOT_LATE["delta"]}
         text = "is not for families of graphs yet, nor for what one graph has proved as one; leave it out"

@@ -226,6 +226,15 @@ def test_growth_of_one_graph_or_of_other_targets_is_not_accepted():
     plain = certify(CONVOY, PROTOCOL, BEGIN, leaders=MovingLeaders(speed=1), asks=Asks(simulation=False))
     data = changed(json.loads(plain.to_json()), ("messages", "leaders", "growth"), "1/100")
     assert "move by themselves" in check(resealed(data)).reason
+    placed = certify(
+        {"day": CONVOY, "night": CONVOY},
+        PROTOCOL,
+        BEGIN,
+        agents=Agents(order=1, offsets=[0, 1, 2, 3]),
+        leaders=MovingLeaders(speed=1),
+    )
+    data = changed(json.loads(placed.to_json()), ("messages", "leaders", "growth"), "1/100")
+    assert "in a formation" in check(resealed(data)).reason
     two = {"day": [("L", "a", 1), ("M", "a", 1)], "night": [("L", "a", 2), ("M", "a", 2)]}
     made = certify(two, PROTOCOL, [1, 2, 3], leaders=MovingLeaders(speed=1))
     data = changed(json.loads(made.to_json()), ("messages", "leaders", "growth"), "1/100")
@@ -238,6 +247,7 @@ def test_growth_of_one_graph_or_of_other_targets_is_not_accepted():
         ([("L", "a", 1), ("M", "a", 1)], {}, "not all targets about a are leaders"),
         (CONVOY, {"messages": LateMessages("0.1")}, "goes on while messages come"),
         (CONVOY, {"agents": Agents(order=2, exchange="virtual")}, "virtual positions"),
+        (CONVOY, {"agents": Agents(order=1, offsets=[0, 1, 2, 3])}, "at other places moves agents otherwise"),
         (CONVOY, {"asks": Asks(initial_set=1)}, "initial_set"),
         (TEAM, {"leaders": MovingLeaders(1, growth=1)}, "a and b are leaders of one group"),
         (CONVOY, {"protocol": SlidingModeProtocol(1, 1, 1, 1, 1, 2, 1, 1, 1)}, "nominal protocol"),

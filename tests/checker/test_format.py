@@ -163,8 +163,8 @@ def test_the_schema_is_a_strict_schema():
         "LateFormWitness": {"psi"},
         "LateLMI": {"floor"},
         "LateLMIWitness": {"errors"},
-        "LateFamilyForm": {"sizes", "floor", "push"},
-        "Moving": {"sign_gain"},
+        "LateFamilyForm": {"sizes", "floor", "push", "growth"},
+        "Moving": {"sign_gain", "growth"},
         "RowsBound": {"cap", "clock", "drift", "after"},
         "VehiclesSection": {"velocity", "input"},
     }
