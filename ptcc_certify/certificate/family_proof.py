@@ -155,7 +155,8 @@ class FamilyProof(Proof):
         behaviour = self.parts[0].component.behaviour or "not decided"
         if len(self.parts) > 1:
             return f"{len(self.parts):,} components"
-        return behaviour + (" for every signal" if behaviour in self.behaviours and behaviour != DEPENDS else "")
+        every = behaviour in self.behaviours and behaviour != DEPENDS and self.family.graph is None
+        return behaviour + (" for every signal" if every else "")
 
     @property
     def main_figure(self) -> str:

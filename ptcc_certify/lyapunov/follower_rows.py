@@ -344,8 +344,7 @@ def refuse_other_targets(family: Family, asked: str = "late messages", mend: str
     """
     if (leader := leading_group(family, asked)) is not None:
         raise HypothesisError(
-            f"with {asked} nothing is proved yet where leaders hear others; "
-            f"{leader} leads and hears others: {mend}"
+            f"with {asked} nothing is proved yet where leaders hear others; {leader} leads and hears others: {mend}"
         )
 
 

@@ -288,7 +288,7 @@ def _of_family(saved: Certificate, why: Counterexamples) -> dict[str, Any]:
     depends, T = any(component.behaviour == DEPENDS for component in components), rational(saved.protocol.T)
     counts = Counter(claim.value for claim in facts_of(saved, details=False) if claim.head == "claim" and claim.value)
     behaviour = next(iter(counts)) if len(counts) == 1 else f"{len(components):,} components settle"
-    title = Markup("{} at T = {} for every signal").format(behaviour, T)
+    title = Markup("{} at T = {}{}").format(behaviour, T, "" if proof.family.graph is not None else " for every signal")
     if depends:
         title = Markup("where agents end depends on the signal")
     elif saved.verdict != "certified":

@@ -157,10 +157,10 @@ def _behaviour_texts(component: FamilyComponent, when: str, also: str) -> tuple[
     if component.behaviour == DEPENDS:
         text = DEPENDS if component.signal == "any" else "depends on which graph it is"
         return text, (text, text)
-    whatever = WHATEVER[component.signal]
+    whatever = f" {WHATEVER[component.signal]}"
     if len(component.family.modes) == 1:
-        whatever = whatever.replace("mode and ", "")
-    text = f"{component.sharpest}{when} {whatever}{also}"
+        whatever = "" if component.family.graph is not None else whatever.replace("mode and ", "")
+    text = f"{component.sharpest}{when}{whatever}{also}"
     sides = component.camps
     if component.behaviour == STABILITY or len(sides) < 2:
         return text, (text, text)

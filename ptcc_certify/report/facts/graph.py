@@ -62,7 +62,8 @@ def family_facts(family: Family, name: str, read: str, components: Sequence[Fami
 
     ``components`` are those of its decision, which hold structures; without them no details are told.
     """
-    yield Fact(head="family", value=family.n_nodes, note=family_text(family, name))
+    head = "family" if family.graph is None else "graph"  # which has something proved as a family of one mode
+    yield Fact(head=head, value=family.n_nodes, note=family_text(family, name))
     if any(map(_tells_columns, family.notes)):
         for way, text in _BY_HEADER.items():
             read = read.replace(ORIENTATION[way], text)

@@ -144,10 +144,10 @@ def _tracking(late: LateBounds, leaders: MovingLeaders, at: Fraction | None) -> 
 def _pushed(late: LateBounds, leaders: MovingLeaders) -> Fact:
     """Tell how fast leaders move, and what disturbs others; where leaders hear each other all who listen."""
     text = leaders_text(leaders)
-    if not late.forms:
-        return Fact(head="leaders", note=text)
-    note = text.removeprefix("at rest; ").replace("of followers", "of all who listen")
-    return Fact(head="agents" if leaders.growth else "disturbed", note=note)
+    if late.forms:
+        text = text.removeprefix("at rest; ").replace("of followers", "of all who listen")
+    head = "agents" if leaders.growth else "disturbed" if late.forms else "leaders"
+    return Fact(head=head, note=text)
 
 
 def leaders_text(leaders: MovingLeaders) -> str:
