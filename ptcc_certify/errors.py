@@ -93,7 +93,18 @@ def labelled(label: str) -> str:
     >>> spell(f"the largest of agent {labelled('delta')}")
     'the largest of agent delta'
     """
-    return f"{LABEL}{label}{LABEL_END}"
+    return f"{LABEL}{quoted(label)}{LABEL_END}"
+
+
+def quoted(label: str) -> str:
+    """Return a label as it stands in a list: in quotation marks where it would read as two, or lose a blank.
+
+    Examples
+    --------
+    >>> print(quoted("Smith, J"), quoted("ann lee"), sep=", ")
+    "Smith, J", ann lee
+    """
+    return f'"{label}"' if "," in label or label != label.strip(" ") else label
 
 
 def unlabelled(text: str) -> str:

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lmi.exact.decimal_rounding import up
+from lmi.exact.decimal_rounding import down, up
 from ptcc_certify.bounds.delay.late_messages import LateBounds
 from ptcc_certify.bounds.envelope import Envelope
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
@@ -28,10 +28,15 @@ from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.checker.input_formulas import InitialSet, root_above
 from ptcc_certify.errors import Change, Sentence, joined
+from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.lyapunov.search import USEFUL
 
 #: The share of the time that is left where the bound is judged.
 LAST = Fraction(1, 100)
+
+
+#: What is much to be left with late messages, of the longest way, and what is asked for then.
+MUCH, LITTLE = 0.1, 0.05
 
 
 #: Digits of the gain that is proposed.
@@ -79,7 +84,7 @@ def use_of(proof: GraphProof | FamilyProof) -> Use:
     if proof.agents is not None:
         return _use_of_agents(proof.agents)
     if proof.late is not None:
-        return _use_of_tracking(proof.late) if proof.late.tracks else _use_of_late(proof.late, proof.longest_way)
+        return _use_of_tracking(proof.late) if proof.late.tracks else _use_of_late(proof, proof.late)
     if isinstance(proof, FamilyProof):
         return _use_of_family(proof)
     if proof.effort is not None and proof.effort.residual:
@@ -228,22 +233,28 @@ def _useful_rho2(envelope: Envelope, constant: float, kappa: Fraction) -> Fracti
     return _rounded_up(rho2 * (1 + Fraction(1, 10**9))) if rho2 > 0 else None
 
 
-def _use_of_late(late: LateBounds, longest_way: float | None) -> Use:
+def _use_of_late(proof: GraphProof | FamilyProof, late: LateBounds) -> Use:
     """Tell whether what is left at ``T`` with late messages is a hundredth of the longest way of an agent, if known.
 
-    The rest of the certificate knows of no delay: what it tells of the input does not hold here.
+    Of much more, and of what a shorter delay mends, it is told how to ask for one that leaves less. The rest of the
+    certificate knows of no delay: what it tells of the input does not hold here.
     """
     caveat = "" if late.inputs is not None else "the input is not proved bounded"
     if math.isinf(late.largest):
         return Use(None, "", caveat)
     if late.largest <= _NOTHING:
         return Use(True, "", caveat)
-    way = 1.0 if late.relative else longest_way
+    way = 1.0 if late.relative else proof.longest_way
     if way is not None and (vehicles := late.vehicles) is not None:  # the way on which they brake, beside that to go
         way += float(max(map(abs, vehicles.v0)) / (vehicles.a1 * late.case.exact.least_gain()))
     relative = " from within 1 of it" if late.relative else ""
     remark = f"every {late.whose} within {up(late.largest, 2)} of {late.goal} at T{relative}"
-    return Use(way is not None and late.largest <= USEFUL * way, remark, caveat)
+    searched = isinstance(proof, GraphProof) and proof.graph.n_nodes <= EXACT_NODES and late.vehicles is None
+    asked = late.leaders is not None or late.messages.value_error or proof.expectations.max_residual is not None
+    advice: Sentence = ""
+    if way and late.largest > MUCH * way and searched and late.messages.age and not asked:
+        advice = Change("max_residual", down(way * LITTLE, 2)), f" asks for a delay that leaves {LITTLE * 100:g} %"
+    return Use(way is not None and late.largest <= USEFUL * way, remark, caveat, advice)
 
 
 def _use_of_tracking(late: LateBounds) -> Use:

@@ -24,6 +24,7 @@ from ptcc_certify.cli import (
     check_and_report,
     classify,
     design,
+    edit,
     examples_and_cite,
     explore,
     influence,
@@ -66,6 +67,7 @@ GROUPS: dict[str, dict[click.Command, str]] = {
         animate.animate: "Make a film of a certificate.",
     },
     "Set up and learn": {
+        edit.edit: "Write a graph without some nodes or edges.",
         new.new: "Write a commented scenario file to begin with.",
         examples_and_cite.examples: "Run the paper's examples, figures included.",
         explore.explore: "Try graph, deadline and gains in a browser.",

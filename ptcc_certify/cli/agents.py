@@ -45,7 +45,7 @@ _OF_SINGLE_INTEGRATORS = {
     "sample_period": "leave it out, or cap the gain with --gain-cap",
     "noise": "leave it out",
     "at": "leave it out; -v tells bounds at several instants",
-    "initial_bound": "give the initial state with --x0 instead",
+    "initial_bound": "bounds are from one initial state, --x0; leave it out",
     **dict.fromkeys([name for name in declared.names_of(LateMessages) if name != "own_delay"], _MESSAGES),
     **dict.fromkeys(declared.names_of(MovingLeaders), "leave it out; their leaders move as their plant does"),
 }

@@ -318,6 +318,9 @@ class Command(click.Command):
 
         rows = self.rows_of_help(ctx)
         topics = [name for name in rows if name]
+        letters = {flag for parameter in self.params for flag in parameter.opts}
+        if all(f"-{letter}" in letters for letter in topic):
+            topic = ""  # flags of one letter in one word, as in -hv
         if topic not in topics and topic.isidentifier() and topic not in GRAPHS:
             near = did_you_mean(topic, topics)
             raise ParameterError(f'--help: there is no topic "{shorten(topic)}"{near}; topics: {", ".join(topics)}')

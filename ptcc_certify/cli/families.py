@@ -36,20 +36,18 @@ _NOT_OF_FAMILIES = tuple(
 )
 
 
-def _pair(context: click.Context, parameter: click.Parameter, texts: Sequence[str]) -> tuple[tuple[str, str], ...]:
-    """Return the edges that ``--optional`` names."""
-    return () if context.resilient_parsing else _pairs(texts)
-
-
-def _pairs(texts: Sequence[str]) -> tuple[tuple[str, str], ...]:
+def edges_named(
+    context: click.Context, parameter: click.Parameter, texts: Sequence[str]
+) -> tuple[tuple[str, str], ...]:
+    """Return the edges that an option such as ``--optional`` names."""
     pairs = []
-    for text in texts:
+    for text in () if context.resilient_parsing else texts:
         try:
             ends = [end.strip() for row in csv.reader([text], strict=True) for end in row]
         except csv.Error:
             ends = []
         if len(ends) != 2 or not all(ends):
-            raise ParameterError(f"--optional: {shorten(text)} is no edge; write SOURCE,TARGET, such as a,b")
+            raise ParameterError(f"{parameter.opts[0]}: {shorten(text)} is no edge; write SOURCE,TARGET, such as a,b")
         pairs.append((ends[0], ends[1]))
     return tuple(pairs)
 
@@ -59,7 +57,7 @@ _DWELL = options_of(DwellTime)["least"]
 mode_options = together(
     click.option("--switching", is_flag=True, help="Family: the graphs are modes, of which any may act at any time."),
     click_option(UNCERTAINTY),
-    click_option(OPTIONAL, callback=_pair),
+    click_option(OPTIONAL, callback=edges_named),
 )
 family_options = together(mode_options, click_option(SIGNAL))
 #: Of ptcc simulate, in the words of ptcc certify, which claims more for such signals.

@@ -47,7 +47,8 @@ def messages_of(graphs: Sequence[str], signed: SignedDigraph | Family, options: 
     delay = Fraction(0) if options["delay"] is None else _delay(graphs, signed, options["delay"])
     if not (any(delay.values()) if isinstance(delay, dict) else delay) and options["period"] is None and not step:
         raise ParameterError(
-            "messages are neither late, nor lost, nor rounded; give --delay, --period or --quantisation above 0"
+            "messages are neither late, nor lost, nor rounded; give --delay, --period or --quantisation above 0, "
+            "or leave them out"
         )
     messages = LateMessages(
         delay=delay,
@@ -146,6 +147,6 @@ def leaders_of(options: Options) -> MovingLeaders | None:
         return None
     delta = parameter("delta", options["delta"] or 0, True)
     if "speed" not in given and "growth" not in given and not delta:
-        mend = f"give {flag_of('leader_speed')}, or {flag_of('delta')} where messages are late"
+        mend = f"give {flag_of('leader_speed')}, or {flag_of('delta')} if followers are disturbed"
         raise ParameterError(f"{flag_of('sign_gain')} belongs to leaders that move; {mend}")
     return MovingLeaders(**{"speed": 0, **given}, disturbance=delta)

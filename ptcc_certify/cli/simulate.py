@@ -99,8 +99,10 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
     from ptcc_certify.graphs.family import Family
 
     suffix, vectors = Path(output or "").suffix.lower(), options["dimension"] > 1
-    given = click.get_current_context().get_parameter_source("age_pattern") is ParameterSource.COMMANDLINE
-    if given and not asked.asks_for_messages(options):
+    source = click.get_current_context().get_parameter_source
+    if options["steps"] is not None and source("samples") is ParameterSource.COMMANDLINE:
+        raise ParameterError("--samples: --steps tells the instants; leave one of them out")
+    if source("age_pattern") is ParameterSource.COMMANDLINE and not asked.asks_for_messages(options):
         raise ParameterError("--pattern says how late messages are; add --delay, --period or --quantisation")
     if suffix not in (*FIGURES, *_TABLES):
         raise ParameterError(f"{output}: CSV is written to .csv, figures to {', '.join(FIGURES)}; choose one of these")
@@ -129,7 +131,7 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
         if protocol.reaching is not None:
             click.echo("note: u is without the sliding terms, which cancel the disturbance", err=True)
         return ExitCode.OK
-    if click.get_current_context().get_parameter_source("method") is ParameterSource.COMMANDLINE:
+    if source("method") is ParameterSource.COMMANDLINE:
         raise ParameterError("--method: chooses the gains of agents of order n; leave it out, or add --agents")
     with progress(("simulation",)) as begin:
         begin("simulation")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ptcc_certify.errors import FormatError, GraphError, ParameterError, UnknownAgentError
+from ptcc_certify.errors import FormatError, GraphError, ParameterError, UnknownAgentError, quoted
 from ptcc_certify.graphs.rationals import shorten
 
 if TYPE_CHECKING:
@@ -129,8 +129,14 @@ def labels_beside(values: Any) -> list[str] | None:
 
 
 def first_five(labels: Sequence[str]) -> str:
-    """Return the first five labels, for a message."""
-    return ", ".join(map(shorten, labels[:5])) + (", ..." if len(labels) > 5 else "")
+    """Return the first five labels, for a message.
+
+    Examples
+    --------
+    >>> print(first_five(["Smith, J", "a"]))
+    "Smith, J", a
+    """
+    return ", ".join(quoted(shorten(label)) for label in labels[:5]) + (", ..." if len(labels) > 5 else "")
 
 
 def in_all(count: int) -> str:

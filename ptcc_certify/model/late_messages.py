@@ -150,7 +150,8 @@ lambda of L, or measure the own state without delay
             raise ParameterError("vehicles", f'{what}; ask for Agents(order=2, exchange="virtual") instead')
         if self.exact and self.vehicles is None and self.leaders is None:
             raise ParameterError(
-                "messages that are neither late, nor lost, nor rounded; give delay, period or value_error above 0"
+                "messages that are neither late, nor lost, nor rounded; give delay, period or value_error above 0, "
+                "or leave messages out"
             )
 
     @property

@@ -65,7 +65,7 @@ class Given:
         return None if instance is None else instance.__dict__[self.name]
 
     def __set__(self, instance: object, value: Exact | None) -> None:
-        instance.__dict__[self.name] = None if value is None else parameter(self.name, value)
+        instance.__dict__[self.name] = None if value is None else parameter(self.name, value, optional=True)
 
 
 class Parameters:
@@ -115,13 +115,16 @@ def readable(value: Fraction) -> str:
     return shorten(str(value))
 
 
-def parameter(name: str, number: Any, zero_allowed: bool = False) -> Fraction:
-    """Return a parameter as an exact rational, or refuse it by name.
+def parameter(name: str, number: Any, zero_allowed: bool = False, optional: bool = False) -> Fraction:
+    """Return a parameter as an exact rational, or refuse it by name; one that is ``optional`` may be left out.
 
     Examples
     --------
     >>> parameter("mu1", "1.2")
     Fraction(6, 5)
+    >>> parameter("noise", 0, optional=True)
+    Traceback (most recent call last):
+    ptcc_certify.errors.ParameterError: noise = 0 is outside its domain; leave it out for none
     """
     domain = ">= 0" if zero_allowed else "> 0"
     try:
@@ -135,7 +138,8 @@ def parameter(name: str, number: Any, zero_allowed: bool = False) -> Fraction:
     if value.numerator.bit_length() + value.denominator.bit_length() > LONGEST_BITS:
         raise ParameterError(name, "has too many digits for exact proofs; round it, to 17 digits say")
     if value < 0 or (value == 0 and not zero_allowed):
-        raise ParameterError(name, f"= {readable(value)} is outside its domain; {name} must be {domain}")
+        mend = "leave it out for none" if optional and value == 0 else f"{name} must be {domain}"
+        raise ParameterError(name, f"= {readable(value)} is outside its domain; {mend}")
     return value
 
 

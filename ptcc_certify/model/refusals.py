@@ -22,7 +22,7 @@ NOT_OF_FAMILIES = (*("at", "initial_set", "limits", "delta", "noise", "agents", 
 #: What is asked of single integrators alone.
 _NOT_OF_AGENTS = {
     "at": "leave it out",
-    "initial_set": "give x0 instead",
+    "initial_set": "bounds are from one initial state, x0; leave it out",
     "limits": "give Agents(gain_cap=..) instead of a gain cap; a stop and sampling are not proved for them",
     "delta": "take the sliding-mode protocol, which disturbances within delta do not move",
     "noise": "leave it out",
@@ -32,7 +32,7 @@ _NOT_OF_AGENTS = {
     "positions: Agents(order=2, exchange='virtual')",
     "disturbance": "leave it out: what holds holds for every disturbance within delta",
 }
-_NO_SET = "is not taken up here, bounds are from one initial state; leave it out, and give x0"
+_NO_SET = "is not taken up here, bounds are from one initial state, x0; leave it out"
 #: What is not proved of double integrators that exchange virtual positions, of all that may be asked.
 _NOT_OF_VEHICLES = ("stop_before", "sample_period", "noise", "delta", "disturbance", "initial_set", "sigma0")
 _WORDS_OF_VEHICLES = {"protocol": "the sliding-mode protocol "}

@@ -20,7 +20,7 @@ from ziamath.tex import tex2mml
 from lmi.exact.decimal_rounding import down, up
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.document import producer
-from ptcc_certify.errors import LABEL, LABEL_END, Change
+from ptcc_certify.errors import LABEL, LABEL_END, Change, quoted
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, writable
 from ptcc_certify.model import Protocol
 from ptcc_certify.report.text_layout import NO_BREAK
@@ -80,7 +80,7 @@ def label(text: str, limit: int = CHARACTERS) -> Markup:
 def labels(nodes: Sequence[Any], names: Sequence[str] | None = None, most: int = LISTED) -> Markup:
     """Return up to ``most`` labels, or those of nodes, and how many more there are; those of a few are cut shorter."""
     limit = CHARACTERS if most >= LISTED else CHARACTERS // 2
-    listing = Markup(", ").join(label(node if names is None else names[node], limit) for node in nodes[:most])
+    listing = Markup(", ").join(label(quoted(node if names is None else names[node]), limit) for node in nodes[:most])
     return listing + (f" and {len(nodes) - most:,} more" if len(nodes) > most else "")
 
 

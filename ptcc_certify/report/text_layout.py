@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from fractions import Fraction
 
 from lmi.exact.decimal_rounding import down, near, up
-from ptcc_certify.errors import LABEL, LABEL_END, labelled, unlabelled
+from ptcc_certify.errors import LABEL, LABEL_END, labelled, quoted, unlabelled
 
 #: Columns of a screen, and of the head of a line on it, blank included.
 WIDTH, HEAD = 80, 11
@@ -66,7 +66,8 @@ def shorten_label(label: str, width: int = 24) -> str:
 
 def agent_text(label: str, width: int = 24) -> str:
     """Return a label, shortened, as it stands in a sentence."""
-    return labelled(shorten_label(printable(unlabelled(label)), width))
+    shown = printable(unlabelled(label))
+    return labelled(shorten_label(shown, width + len(shown) - len(quoted(shown))))
 
 
 def shorten_list(words: Sequence[str], width: int = 90, total: int = 0) -> str:

@@ -196,7 +196,8 @@ class _Fleeing:
     def __init__(self, run: Setup, messages: LateMessages, leaders: MovingLeaders):
         refuse_together(messages, leaders)
         if leaders.sign_gain is not None:
-            raise ParameterError("sign_gain", "is not simulated where messages are late; leave it out")
+            where = "messages are late" if messages.age else "what is heard is off"
+            raise ParameterError("sign_gain", f"is not simulated where {where}; leave it out")
         self.worst, self.t = WorstLeaders(analyse(run.graph), run.protocol, leaders), run.instants.t
         self.pull = run.graph.in_weight()[self.worst.followers] * run.gains_before()[:, None]
         self.inputs = np.zeros((run.instants.t.size, self.worst.heads.size))

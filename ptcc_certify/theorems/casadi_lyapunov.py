@@ -17,6 +17,9 @@ from ptcc_certify.theorems.table import theorem_for
 if TYPE_CHECKING:
     import casadi as ca
 
+#: Digits of the coefficients that a notebook shows.
+_DIGITS = 4
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SymbolicLyapunov:
@@ -75,22 +78,40 @@ class SymbolicLyapunov:
     proof_form: ca.SX
     bounding_form: ca.SX
 
-    def latex(self) -> str:
+    def latex(self, digits: int | None = None) -> str:
         r"""Return the coordinates ``e_{k}``, ``V``, ``V'`` and the gain ``g`` in LaTeX, printed from expressions.
 
         Agents are numbered from 1; ``V'`` is the form of the proof, written in the coordinates.
+
+        Parameters
+        ----------
+        digits : int, optional
+            Of the coefficients of ``V`` and ``V'``, to nearest, by default all: what is rounded is said to be
+            approximately so.
+
+        Examples
+        --------
+        >>> st = analyse(SignedDigraph.from_edges([(1, 2, 4), (2, 3, "1/3")]))
+        >>> form = symbolic_lyapunov(st, theorem_for(st).lyapunov(st), NominalProtocol(T=1, rho1=1, rho2=0, kappa=1))
+        >>> print(form.latex(digits=3).splitlines()[4])
+        \dot V &\approx -g \left(8 e_{2}^{2} - 0.667 e_{2} e_{3} + 0.667 e_{3}^{2}\right) \\
         """
         import casadi as ca
 
-        n, S = len(self.agents), self.decrease
+        def short(entries: np.ndarray) -> tuple[np.ndarray, str]:
+            rounded = entries if digits is None else np.vectorize(lambda x: float(f"{x:.{digits}g}"))(entries)
+            return rounded, "=" if np.array_equal(rounded, entries) else r"\approx"
+
+        n, (weights, of_value) = len(self.agents), short(self.weights)
+        S, of_form = short(self.decrease * (2 - np.eye(n)))  # each pair of coordinates once
         e = [ca.SX.sym(f"e{k + 1}") for k in self.agents]
         pairs = [(i, j) for i in range(n) for j in range(i, n) if S[i, j]]
         squares = [e[i] ** 2 for i in range(n)]
-        value = sum((self.weights[i] * squares[i] for i in range(n)), ca.SX(0))
-        form = sum((S[i, i] * squares[i] if i == j else 2 * S[i, j] * (e[i] * e[j]) for i, j in pairs), ca.SX(0))
+        value = sum((weights[i] * squares[i] for i in range(n)), ca.SX(0))
+        form = sum((S[i, j] * (squares[i] if i == j else e[i] * e[j]) for i, j in pairs), ca.SX(0))
         rows = [f"{to_latex(e[i])} &= {to_latex(self.z[i])}" for i in range(n)]
-        rows.append(f"V &= {to_latex(value)}")
-        rows.append(rf"\dot V &= -g \left({to_latex(form)}\right)")
+        rows.append(f"V &{of_value} {to_latex(value)}")
+        rows.append(rf"\dot V &{of_form} -g \left({to_latex(form)}\right)")
         rows.append(rf"g &= {self.protocol.gain.latex()}")
         return "\\begin{aligned}\n" + " \\\\\n".join(rows) + "\n\\end{aligned}"
 
@@ -98,7 +119,7 @@ class SymbolicLyapunov:
         return f"SymbolicLyapunov({len(self.agents)} coordinates of {self.x.numel()} agents)"
 
     def _repr_latex_(self) -> str:
-        return f"${self.latex()}$"
+        return f"${self.latex(_DIGITS)}$"
 
 
 def symbolic_lyapunov(structure: Any, V: LyapunovFunction, protocol: Protocol) -> SymbolicLyapunov:

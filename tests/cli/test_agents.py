@@ -261,7 +261,7 @@ def test_design_takes_a_scenario_of_agents_and_prints_the_command_that_proves_it
     ("options", "says"),
     [
         (("--agents", "2"), "design needs --max-input U and one of --deadline T, --shortest-deadline"),
-        (("--agents", "2", "--initial-bound", "1"), "--initial-bound: is not proved of agents of order n; give"),
+        (("--agents", "2", "--initial-bound", "1"), "--initial-bound: is not proved of agents of order n; bounds"),
         (("--agents", "2", "--curve", "c.csv"), "--curve: is drawn of single integrators; leave it out"),
         (("--agents", "2", "--input-norm", "2"), "--input-norm: is of single integrators"),
         (("--agents", "2", "--decay", "3"), "decay: below 2 n = 4 no input is proved to be bounded"),

@@ -1151,3 +1151,28 @@ def test_a_terminal_sees_which_step_is_at_work_and_standard_output_does_not(tmp_
     assert b"\x1b[2K" in seen  # the line is erased
     plain = subprocess.run(words, capture_output=True, cwd=tmp_path, check=True)
     assert plain.stderr == b""
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("certify fig1b --noise 0", "--noise = 0 is outside its domain; leave it out for none"),
+        ("certify fig1b --delta 0", "--delta = 0 is outside its domain; leave it out for none"),
+        ("certify fig1b --gain-cap 0", "--gain-cap = 0 is outside its domain; leave it out for none"),
+        ("certify fig1b --delay 0", "give --delay, --period or --quantisation above 0, or leave them out"),
+        ("certify fig1b --noise -1", "noise must be > 0"),
+        ("simulate fig1b --steps 4 --samples 9", "--samples: --steps tells the instants; leave one of them out"),
+        ("simulate fig1b --agents 2 --steps 4 --samples 9", "--samples: --steps tells the instants; leave one"),
+        ("certify fig1b --sign-gain 2 --noise 0.1", "give --leader-speed, or --delta if followers are disturbed"),
+        ("simulate fig1b --sign-gain 2 --noise 0.1 --leader-speed 0.5", "not simulated where what is heard is off"),
+        ("certify fig1b --delay 0.1 --initial-bound 2", "bounds are from one initial state, x0; leave it out"),
+        ("certify fig1b --agents 2 --initial-bound 2", "bounds are from one initial state, --x0; leave it out"),
+    ],
+)
+def test_the_mend_is_of_what_was_asked(words: str, told: str):
+    run = ptcc(*words.split())
+    assert run.code == 2 and run.err.count("\n") == 1 and told in run.err, run
+
+
+def test_flags_of_one_letter_in_one_word_with_that_of_the_help_are_no_topic():
+    assert ptcc("certify", "-hv").out == ptcc("certify", "--help").out

@@ -389,3 +389,34 @@ def test_a_certificate_is_run_as_its_graph_is(tmp_path: Path):
     assert "--switching" in ptcc("simulate", "f.json").err
     ptcc("certify", "team.csv", "--initial-bound", "2", "--no-simulation", "-o", "set.json")
     assert "is of no single initial state" in ptcc("simulate", "set.json").err
+
+
+def test_edit_writes_the_graph_that_is_left_for_the_other_commands():
+    Path("team.csv").write_text('ann,"Lee, K",1/3\n"Lee, K",ann,0.1\n"Lee, K",eve,-2\neve,dan,1\n')
+    run = ptcc("edit", "team.csv", "--without-node", "dan", "--without-edge", 'ann,"Lee, K"', "-o", "left.csv")
+    assert run.code == 0 and run.out.splitlines()[-1].startswith("written    left.csv: 3 nodes, 2 edges"), run
+    whole, left = ptcc_certify.read_graph("team.csv"), ptcc_certify.read_graph("left.csv")
+    assert left == whole.without_nodes("dan").without_edges(("ann", "Lee, K"))
+    assert ptcc("edit", "team.csv", "--without-node", "dan", "--without-edge", 'ann,"Lee, K"').out == (
+        Path("left.csv").read_text()
+    )
+    assert ptcc("edit", "team.csv", "--edges", "listens", "--without-node", "dan", "-o", "turned.csv").code == 0
+    assert ("eve", "Lee, K", -2) in ptcc_certify.read_graph("turned.csv").edges  # written as information flows
+    assert ptcc("certify", "left.csv").code == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ((), "nothing is left out; give --without-node NODE or --without-edge SOURCE,TARGET"),
+        (("--without-node", "zoe"), "no agent is called 'zoe'; there are ann, bob, eve, dan"),
+        (("--without-edge", "bob"), "--without-edge: bob is no edge; write SOURCE,TARGET, such as a,b"),
+        (("--without-edge", "eve,ann"), "there is no edge eve -> ann"),
+        (("--without-node", "ann", "-o", "team.csv"), "team.csv: is read by the command itself; name another file"),
+        (("--without-node", "ann", "-o", "left.gml"), "graphs are written as edge lists; let the name end in .csv"),
+        (tuple(word for label in ("ann", "bob", "eve", "dan") for word in ("--without-node", label)), "no graph"),
+    ],
+)
+def test_what_edit_cannot_leave_out_is_told_in_one_line(words: tuple[str, ...], told: str):
+    run = ptcc("edit", "team.csv", *words)
+    assert run.code == 2 and run.err.count("\n") == 1 and told in run.err, run

@@ -980,3 +980,15 @@ def test_leaders_of_speed_0_are_told_to_rest() -> None:
     disturbed = ptcc("certify", "team.csv", *START, *QUICK, "--delta", "1", "--delay", "0.01", "--gain-cap", "20")
     assert "at rest; any |d_k| <= 1" in disturbed.out and "leaders move" not in disturbed.out
     assert ptcc("simulate", "team.csv", *START, "--delta", "1", "--delay", "0.01", "-o", "r.csv").code == 0
+
+
+def test_where_late_messages_leave_much_the_verdict_says_how_to_ask_for_a_delay_that_leaves_less() -> None:
+    asked = ("certify", "team.csv", "--delay", "0.3", *START, *QUICK)
+    words = " ".join(ptcc(*asked).out.split())
+    advice = re.search(r"(--max-residual) ([\d.]+) asks for a delay that leaves 5 %", words)
+    assert advice is not None, words
+    assert Fraction(advice[2]) == Fraction(3, 20)  # the longest way is 3, from 4 to 1
+    text = " ".join(ptcc(*asked, *advice.groups()).out.split())
+    told = re.search(r"certified where nothing is older than ([\d.]+\d)", text)
+    assert told is not None
+    assert "asks for a delay" not in ptcc("certify", "team.csv", "--delay", told[1], *START, *QUICK).out

@@ -1365,6 +1365,18 @@ def test_a_file_of_raters_that_is_read_as_information_says_so():
     assert read_graph(io.StringIO(table), orientation="listens").read["notes"] == ()
 
 
+@pytest.mark.parametrize("columns", ["listener,speaker,w", "1,2,3"])
+def test_where_the_title_of_a_told_source_says_that_it_listens_a_note_asks(columns: str):
+    table = "listener,speaker,w\na,b,1\nb,c,-1"
+    asks = "listener listens to speaker? --edges listens"
+    graph = read_graph(io.StringIO(table), columns=columns)
+    assert ("a", "b", Fraction(1)) in edges(graph) and asks in graph.read["notes"]  # read as ever
+    for told in ("listens", "information"):
+        assert asks not in read_graph(io.StringIO(table), orientation=told, columns=columns).read["notes"]
+    swapped = read_graph(io.StringIO(table), columns="speaker,listener,w")
+    assert not any("listens" in note for note in swapped.read["notes"])
+
+
 def test_a_header_of_two_columns_may_call_the_values_anything(tmp_path):
     graph = read_graph(io.StringIO("a b;name;1\nname;a b;1"))
     (tmp_path / "x.csv").write_text("name,opinion\na b,2\nname,3\n")

@@ -1,13 +1,18 @@
 """Facts about the protocols as CasADi expressions. LaTeX of the nominal one is tried in test_latex.py."""
 
 import pickle
+import re
+import shutil
+import subprocess
 from fractions import Fraction
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from run_blocks import blocks
 
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -39,6 +44,27 @@ def test_the_closed_loop_is_the_input_in_its_own_symbols():
     assert {s.name() for s in ca.symvar(loop["ode"])} == {"x1", "x2", "t"}
     jacobian = ca.Function("J", [loop["x"], loop["t"]], [ca.jacobian(loop["ode"], loop["x"])])(0, 0)
     np.testing.assert_allclose(np.array(jacobian), -0.6 * graph.laplacian().toarray())
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
+def test_c_code_of_the_guide_compiles_and_computes_what_python_does(tmp_path, monkeypatch):
+    page = (Path(__file__).parents[2] / "docs/guide/python.md").read_text(encoding="utf-8")
+    (block,) = [code for _, code in blocks(page, "python") if "generate(" in code]
+    command = re.search("gcc .*", block)
+    graph = SignedDigraph.from_edges([("ann", "bob", 1), ("bob", "ann", "-2/3"), ("bob", "eve", 1)])
+    names = {"g": graph, "p": PROTOCOL}
+    monkeypatch.chdir(tmp_path)
+    exec(block, names)
+    assert command is not None and subprocess.run(command[0].split(), check=True).returncode == 0
+    compiled, python = ca.external("protocol", str(tmp_path / "protocol.so")), names["protocol"]
+    rng = np.random.default_rng(0)
+    for instant in (0, 0.3, 0.599, 0.6, 1):
+        state = rng.normal(size=3)
+        gain = min(float(PROTOCOL.gain.value(instant)), 50)
+        inputs = np.array(compiled(instant, state)).ravel()
+        np.testing.assert_allclose(inputs, np.array(python(instant, state)).ravel(), rtol=1e-12, atol=1e-12)  # type: ignore[operator]
+        np.testing.assert_allclose(inputs, -gain * (graph.laplacian() @ state), rtol=1e-12, atol=1e-12)
+    assert "bob" in (tmp_path / "bob.c").read_text()
 
 
 def test_an_agent_that_listens_to_nobody_has_no_input():

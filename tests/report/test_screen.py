@@ -20,7 +20,7 @@ from ptcc_certify.bounds.final_state.of_graph import extremes
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.graph_certification import STEPS
 from ptcc_certify.certificate.verdict import NO_SEARCHES
-from ptcc_certify.errors import ExitCode
+from ptcc_certify.errors import ExitCode, UnknownAgentError
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
@@ -224,7 +224,20 @@ def test_a_long_label_keeps_the_end_that_tells_it_apart():
         for x in assert_screen(ptcc.certify(graph, STRONG, [5, 1], asks=ptcc.Asks(simulation=False)))
         if x.startswith("input")
     ]
-    assert line.endswith(("room 0", "room 1"))
+    assert line.endswith(('room 0"', 'room 1"'))
+
+
+def test_a_label_with_a_comma_reads_as_one_in_lists_and_messages():
+    graph = SignedDigraph.from_edges([("Smith, J", "a", 1), ("a", "Lee, K", 1), ("Lee, K", "a", -1)])
+    certificate = ptcc.certify(graph, NOMINAL, [1, 0, 0], asks=ptcc.Asks(simulation=False))
+    text = " ".join(certificate_lines(certificate, "graph"))
+    assert 'nodes      "Smith, J", a, "Lee, K"' in text and '"Smith, J"=1, a=' in text
+    assert not re.findall('[^"]Smith, J|[^"]Lee, K', text)
+    page = report_html(read_certificate(certificate.to_dict()))
+    assert '<bdi>"Smith, J"</bdi>, <bdi>a</bdi>' in page.replace("&#34;", '"')
+    assert "Smith, J" in repr(certificate.final_state) and '"Smith, J"' in repr(certificate.final_state)
+    with pytest.raises(UnknownAgentError, match='there are "Smith, J", a, "Lee, K"'):
+        graph.without_nodes("z")
 
 
 def test_of_many_groups_of_leaders_the_large_ones_are_told():

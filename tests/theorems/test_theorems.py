@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from fractions import Fraction
 
@@ -16,6 +17,7 @@ from hypothesis import strategies as st
 from test_latex import read, rows_of
 
 from ptcc_certify.checker import OBLIGATIONS
+from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.lyapunov.function import LyapunovFunction
@@ -246,6 +248,18 @@ def test_the_latex_of_a_row_has_the_values_of_its_expressions(name: str):
     assert read(rows["V"], **e) == pytest.approx(float(value[0]))
     gain = read(rows["g"], t=instant)
     assert read(rows[r"\dot V"], g=gain, **e) == pytest.approx(float(derivative[0]))
+
+
+def test_a_notebook_shows_coefficients_of_four_digits_and_says_that_they_are_rounded():
+    structure = analyse(load_graph("fig3a"))
+    form = symbolic_lyapunov(structure, theorem_for(structure).lyapunov(structure), PROTOCOL)
+    shown, exact = form._repr_latex_(), form.latex()
+    assert not re.search(r"\d\.\d{5}", shown) and shown.count(r"&\approx") == 2
+    assert r"\approx" not in exact and re.search(r"\d\.\d{12}", exact)
+    shorter = rows_of(form.latex(4).replace(r"\approx", "="))
+    for name, row in rows_of(exact).items():
+        few, full = (re.findall(r"\d+\.?\d*(?= e_)", text) for text in (shorter[name], row))
+        assert [float(x) for x in few] == pytest.approx([float(x) for x in full], rel=5e-4)
 
 
 def certified_rate(graph: SignedDigraph) -> float | None:

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 from lmi.exact.decimal_rounding import down, up
+from ptcc_certify.errors import quoted
 from ptcc_certify.graphs.labels import place_of, position
 from ptcc_certify.graphs.rationals import shorten
 
@@ -56,7 +57,7 @@ class FinalEnds(tuple[Interval | None, ...]):
         return any(label.removeprefix("-").isdecimal() for label in self.labels)
 
     def __repr__(self) -> str:
-        texts = [f"{shorten(label)} {_text(ends)}" for label, ends in zip(self.labels[:8], self, strict=False)]
+        texts = [f"{quoted(shorten(label))} {_text(ends)}" for label, ends in zip(self.labels[:8], self, strict=False)]
         return f"FinalEnds({', '.join(texts)}{', ...' if len(self) > 8 else ''})"
 
 

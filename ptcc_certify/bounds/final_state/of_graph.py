@@ -32,7 +32,7 @@ from lmi.child_process import apart
 from lmi.errors import LMIError
 from lmi.search_time import checkpoint, processor_left, seconds_left
 from lmi.sparse_h_matrix import SparseHMatrix, solve
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import ParameterError, quoted
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import as_state
 from ptcc_certify.graphs.labels import import_pandas, place_of, position, series
@@ -470,7 +470,7 @@ class FinalState(Mapping[str, Number]):
         return series(np.asarray(self), self.labels, "final state")
 
     def __repr__(self) -> str:
-        entries = ", ".join(f"{k}={float(x):.6g}" for k, x in list(zip(self.labels, self.states, strict=True))[:8])
+        entries = ", ".join(f"{quoted(k)}={float(x):.6g}" for k, x in [*zip(self.labels, self.states, strict=True)][:8])
         return f"FinalState({entries}{', ...' if len(self.labels) > 8 else ''})"
 
 

@@ -22,7 +22,7 @@ from ptcc_certify.graphs.io.packaged import GRAPHS, file_or_packaged
 from ptcc_certify.graphs.io.problems import Problems, one_message
 from ptcc_certify.graphs.io.raw_edges import Beside, Nodes, Rows, Signs, distinct, rows_of
 from ptcc_certify.graphs.io.signs import interval_columns, is_sign, weight_and_sign
-from ptcc_certify.graphs.io.table_columns import BY_HEADER, RATERS, Columns, columns_of, edge_columns
+from ptcc_certify.graphs.io.table_columns import BY_HEADER, LISTENS, Columns, columns_of, edge_columns
 from ptcc_certify.graphs.labels import first_five, labels_beside, refuse_written_twice
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading, joined
@@ -174,7 +174,7 @@ def _rows_of_table(table: Any, how: Reading) -> Rows | None:
         beside,
     )
     rows.kind = "DataFrame"
-    rows.notes = tuple(note for note in columns.notes if note not in (BY_HEADER, RATERS))
+    rows.notes = tuple(note for note in columns.notes if note != BY_HEADER and not note.endswith(LISTENS))
     return rows
 
 

@@ -18,7 +18,7 @@ from ptcc_certify.graphs.io.networkx_formats import read_gexf, read_gml, read_gr
 from ptcc_certify.graphs.io.pajek import read_pajek
 from ptcc_certify.graphs.io.raw_edges import Rows
 from ptcc_certify.graphs.io.sif import read_sif
-from ptcc_certify.graphs.io.table_columns import RATERS
+from ptcc_certify.graphs.io.table_columns import LISTENS
 from ptcc_certify.graphs.io.ucinet import read_dl
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading, option_flags, options_of_record
@@ -166,7 +166,7 @@ def _graph(rows: Rows, name: str, how: Reading, ask: bool = False) -> SignedDigr
     if ask and rows.matrix and how.orientation is None:
         raise GraphError(f"{name}: a matrix {WAY}")
     if how.orientation is not None:
-        rows.notes = tuple(note for note in rows.notes if note != RATERS)
+        rows.notes = tuple(note for note in rows.notes if not note.endswith(LISTENS))
     return graph_of(rows, name, how)
 
 

@@ -49,8 +49,9 @@ _NO_TITLE = re.compile(r"nan|na|n/?a|none|null|inf|infinity|true|false|unknown|x
 _TELL_ALL = "name one column weight, sign or rating, or tell the three: --columns source,target,NAME"
 #: The note of a file whose header puts source and target elsewhere than source first.
 BY_HEADER = "columns by header"
-#: The note of a file whose raters were read as those who are heard.
-RATERS = "raters listen? --edges listens"
+#: How a note ends that asks whether those who are read as heard listen, and that of a file of raters.
+LISTENS = "? --edges listens"
+RATERS = f"raters listen{LISTENS}"
 
 
 @dataclass(frozen=True)
@@ -227,7 +228,10 @@ def _told(titles: tuple[str, ...], others: Sequence[Sequence[str]], place: str, 
     by_title = not all(wanted.isdigit() for wanted in how.titles)
     if not by_title and edge_columns(titles, place) is None and not _is_header(titles, at[2], others, place):
         return Columns(at[0], at[1], at[2], told=True, notes=(_note(how.titles, 0, 1, 2),))
-    return Columns(at[0], at[1], at[2], titles=titles, told=True, notes=(_note(titles, *at),))
+    notes, ends = [_note(titles, *at)], (titles[at[0]], titles[at[1]])
+    if _turned(*ends):
+        notes.append(f"{' listens to '.join(map(shorten, ends))}{LISTENS}")
+    return Columns(at[0], at[1], at[2], titles=titles, told=True, notes=tuple(notes))
 
 
 def columns_of_comment(titles: Sequence[str], place: str, prose: bool = False) -> str:
@@ -340,11 +344,15 @@ def _note(titles: Sequence[str], *columns: int) -> str:
     return f"columns {', '.join(shorten(titles[k]) for k in columns)}"
 
 
+def _turned(source: str, target: str) -> bool:
+    """Tell whether a title of the source says that it listens, or one of the target that it is heard."""
+    return bool(re.match(_LISTENERS, plain(source)) or re.match(_HEARD, plain(target)))
+
+
 def _direction(source: str, target: str, weight: str, known: bool, place: str) -> str:
     """Return why the direction must be told; "" where titles tell it, or say as little as Gene1 and Gene2."""
-    ends = plain(source), plain(target)
-    turned = re.match(_LISTENERS, ends[0]) or re.match(_HEARD, ends[1]) or re.fullmatch(_OF_MATRIX, plain(weight))
-    if not turned and (known or re.fullmatch(_NEUTRAL, " ".join(ends))):
+    turned = _turned(source, target) or re.fullmatch(_OF_MATRIX, plain(weight))
+    if not turned and (known or re.fullmatch(_NEUTRAL, f"{plain(source)} {plain(target)}")):
         return ""
     what = f"the header {shorten(source)}, {shorten(target)}, .. names no source and target"
     line = place.rpartition(", ")[2]
