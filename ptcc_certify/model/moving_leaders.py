@@ -72,7 +72,7 @@ give 2 or more
     )
     growth: Given = option(
         "--growth L",
-        "Agents move by themselves, too: x' = f(x) + u, any odd f with |f(x) - f(y)| <= L |x - y|.",
+        "Agents move by themselves, too: x' = f(x) + u, any odd f of slopes up to L.",
         Given(),
         example="0.3",
         unit="1/time",
