@@ -247,6 +247,8 @@ def _read_family(case: Case) -> Family:
         asked, mend, messages = "leaders that move", "leave it out", case.messages
         if case.leaders is not None and case.leaders.growth:
             _refuse_uncarried(family)
+        if case.leaders is not None and case.leaders.saturation:
+            refuse_other_targets(family, "inputs that are clipped", "leave the saturation out")
         if messages is not None:
             asked, late = messages.asked, messages.age > 0 and messages.gain_cap is None
             driven = messages.vehicles is not None and not messages.settles

@@ -17,7 +17,7 @@ from ptcc_certify.certificate.constrained_switching.claims import LastModeClaim
 from ptcc_certify.certificate.constrained_switching.reasons import reasons_for_none
 from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.graph_proof import GraphProof
-from ptcc_certify.errors import Change, Sentence, joined
+from ptcc_certify.errors import Change, Sentence, joined, labelled
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.model.base import Protocol
@@ -198,6 +198,8 @@ def judge_limits(proof: GraphProof) -> list[Answer]:
 def at_deadline(proof: GraphProof | FamilyProof, answer: Answer) -> Answer:
     """Return what becomes at ``T``, where messages are late or leaders move, of a behaviour that follows elsewhere."""
     late = proof.late
+    if late is not None and answer.status == MET and late.unreachable is not None:
+        return Answer(REFUTED, f"{answer.what} at T", _unreachable(*late.unreachable))
     if late is not None and late.tracks and late.leaders is not None and late.largest and answer.status == MET:
         why = "nothing is proved of that" if math.isinf(late.largest) else "nothing settles under a cap"
         return Answer(OPEN, f"{answer.what} at T {late.leaders.while_told}", why)
@@ -256,6 +258,8 @@ def judge_messages(proof: GraphProof | FamilyProof) -> list[Answer]:
         return answers
     if not late.says_something and late.tracks:
         told = Answer(OPEN, late.messages.asked_of_leaders, late.missing)
+        if late.unreachable is not None:
+            told = Answer(REFUTED, late.messages.asked_of_leaders, _unreachable(*late.unreachable))
         return [told, *_nothing_left(most)]
     if not late.says_something:
         limited = 0 < (late.longest_delay or 0) < math.inf
@@ -289,6 +293,11 @@ def _longest(late: LateBounds, what: str = "") -> str:
         return ""
     alike = ", all delays in proportion" if isinstance(late.messages.delay, Mapping) else ""
     return f"; {what}certified where nothing is older than {down(late.enough, 4)}{alike}"
+
+
+def _unreachable(label: str, off: Fraction) -> str:
+    """Tell who cannot come to where it ends."""
+    return f"agent {labelled(label)} is off its final state at T by {down(off, 3)} at least, whatever it does"
 
 
 def _misses(late: LateBounds, missed: Missed) -> str:

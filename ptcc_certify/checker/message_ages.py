@@ -35,12 +35,15 @@ class Moving:
         What followers add times ``sign(e_k)``: at least the sum of these.
     growth : Fraction or None
         The Lipschitz constant of what all agents do by themselves, which is odd; None if that is nothing.
+    saturation : Fraction or None
+        What the inputs of followers are clipped to.
     """
 
     speed: NotNegative
     disturbance: NotNegative
     sign_gain: Fraction | None = None
     growth: Positive | None = None
+    saturation: Positive | None = None
 
     @property
     def push(self) -> Fraction:
@@ -104,6 +107,11 @@ class Messages:
     def growth(self) -> Fraction:
         """At what rate what agents do by themselves parts two of them, at most."""
         return (None if self.leaders is None else self.leaders.growth) or Fraction(0)
+
+    @property
+    def saturation(self) -> Fraction | None:
+        """What inputs are clipped to."""
+        return None if self.leaders is None else self.leaders.saturation
 
     def grown(self, growth: Fraction) -> Fraction:
         """Bound ``e^(growth T)`` from above: by so much more is left of anything at ``T`` than without growth.
@@ -221,4 +229,7 @@ def check_delays(gain: PrescribedGain, section: Delays) -> Messages:
         need(not virtual and delay == 0, "agents that move by themselves beside virtual positions, or late messages")
     late, cap = section.own == "late", section.gain_cap
     need(cap is not None or not late, "the own state is late, and the gain has no cap: the protocol diverges")
+    if leaders is not None and leaders.saturation is not None:
+        alone = not virtual and delay == 0 and leaders.growth is None and leaders.sign_gain is None
+        need(alone and not leaders.push, "inputs that are clipped beside late messages, leaders that move or vehicles")
     return Messages(gain, latency, delay, late, section.value_error, cap, leaders)

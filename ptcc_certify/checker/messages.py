@@ -8,6 +8,7 @@ from fractions import Fraction
 from itertools import pairwise
 
 from lmi.exact.decimal_rounding import down
+from lmi.exact.elementary_enclosures import exp, rounded
 from lmi.exact.work import spend
 from ptcc_certify.checker.delay_lmi import LateLMI, check_delay_lmi
 from ptcc_certify.checker.delayed_forms import LateForm, SettlingSection, check_form, check_settling
@@ -18,12 +19,19 @@ from ptcc_certify.checker.follower_rows import Followers, Rows, followers_of
 from ptcc_certify.checker.forms_of_families import FunctionOfSignals, LateFamilyForm, check_forms_of_family
 from ptcc_certify.checker.graph import MANY_EDGES
 from ptcc_certify.checker.input import Verified
-from ptcc_certify.checker.input_formulas import drift_above
-from ptcc_certify.checker.message_ages import Delays, Messages, Moving, check_delays, need_left
+from ptcc_certify.checker.input_formulas import BITS, Limits, drift_above
+from ptcc_certify.checker.message_ages import LARGEST_GROWTH, Delays, Messages, Moving, check_delays, need_left
 from ptcc_certify.checker.missed_deadline import MissedDeadline, check_missed, check_staged
 from ptcc_certify.checker.protocol import Begin, Protocol
 from ptcc_certify.checker.reading import length, need
-from ptcc_certify.checker.section_declarations import Agents, ByFollower, FollowerNumbers, Positive, Several
+from ptcc_certify.checker.section_declarations import (
+    Agents,
+    ByFollower,
+    FollowerNumbers,
+    NotNegative,
+    Positive,
+    Several,
+)
 from ptcc_certify.checker.stated_bounds import Decay, DecayOfAll, Inputs, Residual, Vehicles, VehiclesSection
 from ptcc_certify.checker.stepwise_bounds import Steps
 from ptcc_certify.checker.stepwise_inputs import Walk
@@ -37,7 +45,7 @@ OF_ONE_GRAPH = ("steps", *AT_REST)
 
 @dataclass(frozen=True, kw_only=True)
 class RowsBound:
-    """A bound by rows; ``drift`` and ``after`` where leaders move."""
+    """A bound by rows; ``drift`` and ``after`` where leaders move, ``start`` and ``turn`` where inputs are clipped."""
 
     cap: Positive | None = None
     clock: Fraction | None = None
@@ -46,6 +54,8 @@ class RowsBound:
     floor: Fraction
     drift: Fraction | None = None
     after: Fraction | None = None
+    start: Fraction | None = None
+    turn: NotNegative | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,6 +108,8 @@ def check_messages(
         need(not protocol.sliding, "leaders that move under the sliding-mode protocol")
         need(all(getattr(section, key) is None for key in AT_REST), f"one of {', '.join(AT_REST)} though leaders move")
         need(section.steps is None or messages.leaders.sign_gain is None, "steps beside a sign term")
+    if messages.saturation is not None:
+        need(isinstance(of, Family) and section.forms is None, "inputs that are clipped of one graph, or by forms")
     if messages.growth:
         carried = isinstance(of, Family) and all(one.carried for one in of.components)
         need(carried, "agents that move by themselves to targets that are neither 0, a leader nor its opposite")
@@ -180,6 +192,8 @@ def _check_rows(
     cap, clock, left, initial, floor = entry.cap, entry.clock, entry.left, entry.initial, entry.floor
     for x in (entry.drift, entry.after):
         need((x is None) == (messages.leaders is None), "drift and after are told iff leaders move")
+    for x in (entry.start, entry.turn):
+        need((x is None) == (messages.saturation is None), "start and turn are told iff inputs are clipped")
     obligation = doc.open("late-rows", of)
     q, b = obligation["q"], obligation["b"]
     need(q > 1 or (q == 1 and messages.delay == 0), "q is not above 1")
@@ -191,7 +205,7 @@ def _check_rows(
     limit = need_left(messages, q, b, cap, clock, left)
     grown = messages.grown(messages.growth)
     more = messages.lasting(messages.growth, b) or grown
-    rows.above_initial(initial / grown)
+    rows.above_initial(_clipped(messages, rows, b, entry) if messages.saturation is not None else initial / grown)
     rows.above_floor(floor, messages.wrong * more)
     drift, highest = Fraction(0), floor
     if messages.leaders is not None:
@@ -200,6 +214,27 @@ def _check_rows(
     for one in stated:
         one.by_rows(rows, Decay(b, cap, left, initial, floor, drift, highest))
     doc.done(f"b = {down(b)}, q = {down(q)}")
+
+
+def _clipped(messages: Messages, rows: Rows, b: Fraction, entry: RowsBound) -> Fraction:
+    """Verify ``initial``, though inputs are clipped; return what bounds ``|x_k(0) - x*_k| / u_k`` then.
+
+    Up to ``turn`` that falls by ``saturation/max u`` per unit of time, from there on by ``e^(-b s)``: what ``u`` makes
+    of inputs is clipped no more, for ``b k >= 1``.
+    """
+    start, turn, gain = entry.start or Fraction(0), entry.turn or Fraction(0), messages.gain
+    assert messages.saturation is not None
+    speed = messages.saturation * rows.scale / max(rows.u)
+    bits = length((start, turn, speed, b, entry.initial, gain.T, gain.rho1, gain.k, messages.gain_cap or b))
+    spend(100, bits, bits, "inputs that are clipped")
+    need(turn < gain.T and b * gain.k >= 1, "turn is not before T, or b k is below 1")
+    level, acts = start - speed * turn, gain.value(1 - turn / gain.T)
+    acts = acts if messages.gain_cap is None else min(acts, messages.gain_cap)
+    need(level >= 0 and b * acts * level <= speed, "inputs are clipped at the turn")
+    passed = Limits(messages.gain_cap, gain.T - turn).clock_above(gain) if turn else Fraction(0)
+    need(b * passed <= LARGEST_GROWTH, "the turn is too late")
+    need(entry.initial >= level * exp(rounded(b * passed, BITS, up=True), BITS)[1], "initial is not proved")
+    return start
 
 
 def _drift(

@@ -200,11 +200,14 @@ class Inputs:
 
         Since ``heard_k <= (D_k - b) u_k``, of any weights. Where these are uncertain, the largest are taken. Where
         nothing is late ``(D_k u_k + heard_k)`` times what bounds ``gain m`` does, too; and ``sign_gain`` is added.
+        Where inputs are clipped what they are clipped to does.
         """
         followers, b, leaders = rows.followers, decay.b, self.messages.leaders
         (most, unit), (degrees, _) = rows.largest, followers.degrees
         sign = (Fraction(0) if leaders is None else leaders.sign_gain or Fraction(0)), [1] * len(degrees)
         self.stated.meet(followers.others)  # leaders that rest, or move as they like
+        if (saturation := self.messages.saturation) is not None:
+            self.stated.meet(followers.nodes, (saturation, [1] * len(degrees)))
         falling = self.messages.falling_input(b, decay.initial, rows.least)
         if falling is not None:
             self.stated.meet(followers.nodes, (falling / (rows.scale * unit), most), sign)

@@ -146,7 +146,7 @@ def leaders_of(options: Options) -> MovingLeaders | None:
     if not given:
         return None
     delta = parameter("delta", options["delta"] or 0, True)
-    if "speed" not in given and "growth" not in given and not delta:
+    if given.keys() == {"sign_gain"} and not delta:
         mend = f"give {flag_of('leader_speed')}, or {flag_of('delta')} if followers are disturbed"
         raise ParameterError(f"{flag_of('sign_gain')} belongs to leaders that move; {mend}")
     return MovingLeaders(**{"speed": 0, **given}, disturbance=delta)

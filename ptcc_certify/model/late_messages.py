@@ -211,8 +211,10 @@ lambda of L, or measure the own state without delay
     def asked_of_leaders(self) -> str:
         """What is asked by their leaders, in words: that they move, disturbances, or a cap alone."""
         if self.leaders is not None and not self.leaders.idle:
-            moved = "disturbances" if self.leaders.disturbance else "agents that move by themselves"
-            return "leaders that move" if self.leaders.speed else moved
+            own = self.leaders
+            asked: dict[str, Any] = {"leaders that move": own.speed, "disturbances": own.disturbance}
+            asked |= {"inputs that are clipped": own.saturation, "agents that move by themselves": own.growth}
+            return next(name for name, given in asked.items() if given)
         return "a gain cap"
 
     def latencies(self, of: SignedDigraph | Family) -> Fraction | tuple[Fraction, ...]:

@@ -35,6 +35,8 @@ class MovingLeaders(Parameters):
         ``T``. Without it they are there at ``T``.
     growth : number or str, optional
         The Lipschitz constant of ``f``, positive, 1/time; without it ``f = 0``.
+    saturation : number or str, optional
+        What the inputs of followers are clipped to, positive, in units of the input.
 
     Raises
     ------
@@ -77,6 +79,14 @@ give 2 or more
         example="0.3",
         unit="1/time",
     )
+    saturation: Given = option(
+        "--saturation U",
+        "Nominal: inputs are clipped to [-U, U].",
+        Given(),
+        key="limits.saturation",
+        example="10",
+        unit="state/time",
+    )
 
     def __post_init__(self) -> None:
         if self.sign_gain is not None and self.sign_gain < self.total:
@@ -97,6 +107,8 @@ give 2 or more
         """During what something holds or not: while they move, under disturbances, or under a cap alone."""
         if self.moving:
             return "while leaders move" if self.speed else "while agents move by themselves"
+        if self.saturation:
+            return "of inputs that are clipped"
         return "under disturbances" if self.disturbance else "under a cap"
 
     @property
@@ -106,8 +118,13 @@ give 2 or more
 
     @property
     def idle(self) -> bool:
-        """Whether leaders rest, and nothing moves or disturbs anybody."""
-        return not (self.total or self.growth or self.sign_gain is not None)
+        """Whether leaders rest, and nothing moves, disturbs or limits anybody."""
+        return not (self.total or self.growth or self.saturation or self.sign_gain is not None)
+
+    @property
+    def clipped(self) -> bool:
+        """Whether inputs are clipped, and nothing else is asked."""
+        return self.saturation is not None and not (self.total or self.growth or self.sign_gain)
 
     @property
     def total(self) -> Fraction:

@@ -82,8 +82,8 @@ def refuse_before_the_graph(case: Case) -> None:
 def asked_of_signals(structure: Structure, case: Case) -> bool:
     """Tell whether what is asked of one graph is proved of families alone, of which it is one of a single mode.
 
-    These are agents that move by themselves, disturbances beside messages where leaders hear each other, and values
-    that are off without a gain cap.
+    These are agents that move by themselves, inputs that are clipped, disturbances beside messages where leaders hear
+    each other, and values that are off without a gain cap.
 
     Examples
     --------
@@ -96,8 +96,8 @@ def asked_of_signals(structure: Structure, case: Case) -> bool:
     groups = any(len(c.nodes) > 1 for c in structure.closed_components)
     if messages is None or case.sliding or (groups and not messages.at_rest):
         return False
-    if messages.leaders is not None:
-        return groups or messages.leaders.growth is not None
+    if (leaders := messages.leaders) is not None:
+        return groups or leaders.growth is not None or leaders.saturation is not None
     return groups and messages.value_error > 0 and messages.gain_cap is None
 
 
@@ -166,6 +166,7 @@ it out
         "delta": asked["delta"] or (leaders is not None and leaders.disturbance > 0),
         "sign_gain": leaders is not None and leaders.sign_gain is not None,
         "growth": leaders is not None and leaders.growth is not None,
+        "saturation": leaders is not None and leaders.saturation is not None,
         "own_delay": messages is not None and messages.own_delay,
     }
     if name := next((name for name, given in asked.items() if given), None):
@@ -258,6 +259,15 @@ leave one of the two out
     """
     if messages is None or leaders is None:
         return
+    if leaders.saturation is not None:
+        beside: dict[str, Any] = {
+            "late messages": messages.age,
+            "leaders that move": leaders.speed,
+            "growth": leaders.growth,
+        }
+        beside |= {"disturbances": leaders.disturbance, "a sign term": leaders.sign_gain}
+        if what := next((name for name, given in beside.items() if given), None):
+            raise ParameterError("saturation", f"beside {what} is not certified yet; leave one of the two out")
     if messages.age and leaders.growth:
         why = "a target that moves by itself goes on while messages come, and nothing tells how far"
         raise ParameterError("growth", f"beside late messages is not certified: {why}; leave one of the two out")

@@ -11,7 +11,10 @@ and followers are pushed by ``d gain(t)/g``: within the limits of ``v`` and ``d`
 Where agents move by themselves ``f(x) = growth x``, by which they part fastest: over a step that multiplies positions
 and ``eps`` by ``e^(growth dt)``, and what drives them is as much less before.
 
-So without the sign term every run is a solution, up to rounding. The sign term is held over steps, at a value that
+Inputs that are clipped to ``U`` move ``eps`` by ``clip(g e, U)`` per unit of time, ``g`` the mean gain of the step, in
+steps of Runge and Kutta.
+
+So without these and the sign term every run is a solution, up to rounding. The sign term is held over steps, at a value that
 ``mu sign(e)`` takes where the step ends: of any within ``mu`` where ``e`` is 0 there, so that it stays 0.
 """
 
@@ -188,9 +191,9 @@ def simulate_tracking(
         states[i, F] = targets[i, F] + eps
         inputs[i, F] = -run.gains[i] * (worst.L_F @ eps)
         if i < passed.size:
-            moved, eps = step_of(eps * grown[i], clock[i], highest[i])
+            moved, eps = step_of(eps * grown[i], clock[i], highest[i], passed[i])
             lead, inputs[i, heads] = lead * grown[i] + moved, moved / passed[i]
-        inputs[i, F] += step_of.term
+        inputs[i, F] = step_of.clip(inputs[i, F] + step_of.term, 1.0)
     return run.stepped(states.T, Tolerances(NEAREST, NEAREST), held_input=inputs.T, targets=targets.T)
 
 
@@ -210,11 +213,19 @@ class _Step:
         self.inverse = np.linalg.inv(worst.L_F)
         self.sign = None if leaders.sign_gain is None else float(leaders.sign_gain)
         self.term = np.zeros(worst.followers.size)
+        self.saturation = np.inf if leaders.saturation is None else float(leaders.saturation)
 
-    def __call__(self, eps: np.ndarray, ds: float, gain: float) -> tuple[np.ndarray, np.ndarray]:
+    def clip(self, moved: np.ndarray, dt: float) -> np.ndarray:
+        """Return what inputs that are clipped leave of what they would move agents by in so long a time."""
+        return np.clip(moved, -self.saturation * dt, self.saturation * dt)
+
+    def __call__(self, eps: np.ndarray, ds: float, gain: float, dt: float) -> tuple[np.ndarray, np.ndarray]:
         """Return by how much leaders move, and the deviations after the step."""
+        rest = np.zeros(self.worst.heads.size)
         if np.isinf(gain):
-            return np.zeros(self.worst.heads.size), np.zeros_like(eps)
+            return rest, eps + self.clip(-eps, dt)
+        if np.abs(self.L_F @ eps).max() * gain > self.saturation:
+            return rest, self._clipped(eps, ds, dt)
         v = self.worst.velocities(eps)
         push, E = self.worst.pushes(eps) - self.worst.Q @ v, _decay(self.L_F * ds)
         passed = (np.eye(eps.size) - E) / gain
@@ -223,6 +234,18 @@ class _Step:
             self.term = _sign_term(passed, -(self.L_F @ new), self.sign, self.term)
             new = new + self.inverse @ (passed @ self.term)
         return v * ds / gain, new
+
+    def _clipped(self, eps: np.ndarray, ds: float, dt: float) -> np.ndarray:
+        """Return the deviations after a step in which some inputs are clipped."""
+        count = max(4, int(np.ceil(4 * ds * np.abs(self.L_F).sum(axis=1).max())))
+        h, g = dt / count, ds / dt
+        for _ in range(count):
+            k1 = self.clip(-g * (self.L_F @ eps), 1.0)
+            k2 = self.clip(-g * (self.L_F @ (eps + h / 2 * k1)), 1.0)
+            k3 = self.clip(-g * (self.L_F @ (eps + h / 2 * k2)), 1.0)
+            k4 = self.clip(-g * (self.L_F @ (eps + h * k3)), 1.0)
+            eps = eps + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        return eps
 
 
 def _sign_term(A: np.ndarray, e: np.ndarray, mu: float, term: np.ndarray) -> np.ndarray:

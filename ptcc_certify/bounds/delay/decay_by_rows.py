@@ -15,6 +15,10 @@ Where nothing is late and the gain has no cap this is 0 at ``T``, and with ``p =
     (speed + disturbance) / min u  (T - t) (1 - ((T - t)/T)^(p - 1)) / (p - 1).
 
 A sign term takes it up: followers that are on their targets at ``T`` stay there.
+
+Where inputs are clipped to ``U``, ``|x_k - x_k*|`` is at most ``u_k (start - U t/max u)`` first, for some row of the
+maximum that is clipped moves at ``U``, and others do not need to; and once ``b gain`` times this is at most ``U/max u``
+it decays as above, if ``b rho2 kappa >= 1``. Both are below ``initial e^(-b s)``, ``initial`` what makes this so.
 """
 
 from __future__ import annotations
@@ -30,9 +34,9 @@ import numpy as np
 from lmi.dyadic import round_to_bits
 from lmi.errors import LMIError, NoCertificate
 from lmi.exact.decimal_rounding import float_up
-from lmi.exact.elementary_enclosures import log, rounded
+from lmi.exact.elementary_enclosures import exp, log, rounded
 from ptcc_certify.bounds.delay.case import LateCase, Moments
-from ptcc_certify.checker.input_formulas import BITS, drift_above
+from ptcc_certify.checker.input_formulas import BITS, Limits, drift_above
 from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
 from ptcc_certify.model.gain import Gain
 
@@ -40,6 +44,10 @@ from ptcc_certify.model.gain import Gain
 SEARCHED_FOLLOWERS = 3000
 #: Values of ``q`` that are tried, and the largest one; losses of ``b`` for a more even vector.
 _TRIED, _LARGEST_Q, _LOSSES = 10, 1e9, (0.01, 0.2, 0.6)
+#: The same where inputs are clipped: an even vector is what matters, as long as ``b rho2 kappa >= 1``.
+LOSSES_CLIPPED = (0.01, 0.2, 0.4, 0.6, 0.75, 0.85, 0.92, 0.96, 0.98, 0.99, 0.995, 0.999)
+#: Halvings by which is found when inputs are clipped no more.
+_HALVINGS = 60
 #: The largest exponent of what grows after ``T``, in floats.
 _LARGEST_EXPONENT = 700.0
 #: The share of the time that is left where bounds of followers of moving leaders are compared.
@@ -64,6 +72,9 @@ class RowBound:
         From above.
     drift, after : Fraction or None
         What leaders that move, and disturbances, add to ``floor`` at ``T``, and at all times; None where leaders rest.
+    start, turn : Fraction or None
+        Where inputs are clipped: the largest ``|x_k(0) - x_k*| / u_k``, and until when that falls by ``U/max u`` per
+        unit of time.
     """
 
     witness: RowWitness
@@ -74,6 +85,8 @@ class RowBound:
     floor: Fraction
     drift: Fraction | None = None
     after: Fraction | None = None
+    start: Fraction | None = None
+    turn: Fraction | None = None
 
     def stays(self, case: LateCase) -> bool:
         """Whether what is left at ``T`` is never exceeded: nothing is, or growth is slower than the decay then."""
@@ -102,13 +115,25 @@ class RowBound:
         (y, added), u = self.decay(case, t), np.zeros((len(case.of.labels), 1))
         u[case.followers, 0] = self.witness.u
         floor = lasting(case, self.witness.b, u * float(self.floor), t, case.growth)
-        return Moments(float(self.witness.b), y, u * (float(self.initial) * y + added), floor)
+        falls = float(self.initial) * y + added
+        if self.start is not None and self.turn is not None and case.exact.saturation is not None:
+            first = float(self.start) - float(case.exact.saturation) / float(self.witness.u.max()) * t
+            falls = np.where(t < float(self.turn), np.minimum(falls, first * MORE), falls)
+        return Moments(float(self.witness.b), y, u * falls, floor)
 
     def highest_floor(self, case: LateCase) -> Fraction:
         """Return what errors of values, leaders that move and disturbances add at most up to ``T``."""
         return self.floor + (self.after or 0) * case.exact.least_gain(always=True) / case.exact.least_gain()
 
     def inputs(self, case: LateCase, rows: FollowerRows) -> np.ndarray | None:
+        """Bound the inputs of followers, and a sign term; None where nothing does."""
+        found, most = self._not_clipped(case, rows), case.exact.saturation
+        if most is None:
+            return found
+        clipped = np.full(self.witness.u.size, float_up(most))
+        return clipped if found is None else np.minimum(found, clipped)
+
+    def _not_clipped(self, case: LateCase, rows: FollowerRows) -> np.ndarray | None:
         """Bound ``gain (D_k |eps_k| + sum_l |w_kl| |eps_l(t - tau_kl)| + error D_k)`` of followers, and a sign term.
 
         Under a cap, or where messages come at once and exactly, if ``gain e^(-b s)`` falls. None elsewhere.
@@ -242,7 +267,8 @@ def search_rows(case: LateCase, rows: FollowerRows, first: np.ndarray) -> tuple[
     small = rows.D.size <= SEARCHED_FOLLOWERS
     with suppress(LMIError):  # the equations of the followers are too ill-conditioned for floats
         if not case.messages.age:
-            for loss in _LOSSES[: None if small else 1]:
+            losses = _LOSSES if case.exact.saturation is None else LOSSES_CLIPPED
+            for loss in losses[: None if small else 1]:
                 offer(1.0, loss)
         else:
             best_q = 1.0 if small else _best_q(case, rows)
@@ -294,6 +320,33 @@ def _best_q(case: LateCase, rows: FollowerRows) -> float:
     return best
 
 
+def _clipped(
+    case: LateCase, witness: RowWitness, start: Fraction, speed: Fraction
+) -> tuple[Fraction, Fraction, Fraction]:
+    """Return ``start``, ``turn`` and ``initial`` of a witness where inputs are clipped.
+
+    Raises
+    ------
+    NoCertificate
+        ``b rho2 kappa`` is below 1, or ``start`` is too large for the inputs.
+    """
+    gain, b, cap = case.protocol.gain.exact, witness.b, case.messages.gain_cap
+
+    def clipped(t: Fraction) -> bool:
+        acts = gain.value(1 - t / gain.T)
+        return b * min(acts, cap or acts) * (start - speed * t) > speed
+
+    if b * gain.k < 1 or start >= speed * gain.T:
+        raise NoCertificate("inputs that are clipped do not bring them there, as far as is proved")
+    low, turn = Fraction(0), start / speed if clipped(Fraction(0)) else Fraction(0)
+    for _ in range(_HALVINGS if turn else 0):
+        middle = rounded((low + turn) / 2, BITS, up=True)
+        low, turn = (middle, turn) if clipped(middle) else (low, middle)
+    passed = Fraction(0) if not turn else Limits(cap, gain.T - turn).clock_above(gain)
+    grown = rounded(exp(rounded(b * passed, BITS, up=True), BITS)[1], BITS, up=True)
+    return start, turn, rounded((start - speed * turn) * grown, BITS, up=True)
+
+
 def row_bound(case: LateCase, rows: FollowerRows, first: np.ndarray, witness: RowWitness) -> RowBound:
     """Return what a witness proves.
 
@@ -313,6 +366,9 @@ def row_bound(case: LateCase, rows: FollowerRows, first: np.ndarray, witness: Ro
     initial = Fraction(float((first / witness.u).max()) * MORE) * grown
     stands = Fraction(floor * MORE) * more
     row = RowBound(witness, cap, case.clock(cap), case.left(witness.b, cap), initial, stands)
+    if (most := case.exact.saturation) is not None:
+        start, turn, initial = _clipped(case, witness, initial, most / Fraction(float(witness.u.max())))
+        row = replace(row, start=start, turn=turn, initial=initial)
     if case.leaders is None:
         return row
     push = case.push / Fraction(float(witness.u.min())) * grown

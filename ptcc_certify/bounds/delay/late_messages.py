@@ -22,7 +22,7 @@ from lmi.errors import LMIError
 from lmi.exact.decimal_rounding import float_up, up
 from ptcc_certify.bounds.delay.case import LateCase, asked_leaders, read_leaders
 from ptcc_certify.bounds.delay.certain_misses import Missed, find_missed
-from ptcc_certify.bounds.delay.decay_by_rows import MORE, RowBound, away, search_rows
+from ptcc_certify.bounds.delay.decay_by_rows import LOSSES_CLIPPED, MORE, RowBound, away, search_rows
 from ptcc_certify.bounds.delay.decay_by_steps import Steps, bound_steps, search_steps
 from ptcc_certify.bounds.delay.delay_lmi import DelayLMIBound
 from ptcc_certify.bounds.delay.followers_of_groups import Settling
@@ -144,10 +144,39 @@ class LateBounds:
     @property
     def missing(self) -> str:
         """What was not found, in words, where nothing is proved."""
+        if self.case.exact.saturation is not None:
+            return self._not_reached
         of_groups = isinstance(self.structure, Family) and self.case.led_by_groups
         if of_groups and self.relative:
             return "it asks for an initial state"
         return f"no {'Lyapunov function that bears it' if of_groups else 'vector for the followers'} was found"
+
+    @cached_property
+    def _not_reached(self) -> str:
+        """What it would take that inputs that are clipped bring followers to where they end, in words."""
+        gain, rows = self.case.protocol.gain.exact, late_rows(self.case)
+        first, enough, rates = away(self.case, rows), math.inf, [Fraction(0)]
+        for loss in LOSSES_CLIPPED:
+            with suppress(LMIError):
+                witness = rows.witness(Fraction(1), loss)
+                rates.append(witness.b)
+                if witness.b * gain.k >= 1:
+                    enough = min(enough, float((first / witness.u).max() * witness.u.max() / float(gain.T)))
+        if math.isinf(enough):
+            least = up(1 / (max(rates) * self.case.protocol.kappa), 3) if max(rates) else ""
+            return f"it asks for rho2 of at least {least}" if least else "no vector for the followers was found"
+        return f"it asks for inputs of at least {up(enough * (1 + 1e-6), 3)}"
+
+    @cached_property
+    def unreachable(self) -> tuple[str, Fraction] | None:
+        """An agent that no inputs that are clipped so far bring to where it ends by ``T``, and how far it is off."""
+        most, case = self.case.exact.saturation, self.case
+        if most is None or case.relative or case.ends is None:
+            return None
+        reach = most * case.protocol.T
+        off = [(abs(case.state[v] - case.ends[v][0]) - case.ends[v][1] - reach, v) for v in self.followers.tolist()]
+        worst, agent = max(off)
+        return (self.labels[agent], worst) if worst > 0 else None
 
     @property
     def whose(self) -> str:

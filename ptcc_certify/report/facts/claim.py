@@ -62,6 +62,7 @@ def assumptions(certificate: Certificate, states: bool = False) -> list[str]:
         without_flaws(messages): messages is not None and not messages.exact,
         "leaders at rest": leaders is not None and leaders.speed > 0,
         "without growth": leaders is not None and leaders.growth is not None,
+        "without clipping": leaders is not None and leaders.saturation is not None,
         "without disturbances": leaders is not None and leaders.disturbance > 0,
         "without sign(e_k)": leaders is not None and leaders.sign_gain is not None,
     }

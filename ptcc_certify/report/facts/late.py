@@ -109,9 +109,10 @@ def _vehicles(certificate: Certificate, late: LateBounds) -> Facts:
 
 def _tracking(late: LateBounds, leaders: MovingLeaders, at: Fraction | None) -> Facts:
     """Tell how followers track leaders that move, of which they hear at once."""
-    head = "limited" if leaders.idle else "tracking"  # where a cap is all that was asked
+    alone = leaders.idle or leaders.clipped
+    head = "limited" if alone else "tracking"  # where limits are all that was asked
     if not leaders.idle:
-        yield _pushed(late, leaders)
+        yield Fact(head=head, note=leaders_text(leaders)) if alone else _pushed(late, leaders)
     if not late.says_something:
         yield Fact(head=head, standing="unproved", note=f"nothing is proved: {late.missing}", loud=True)
         return
@@ -159,6 +160,8 @@ def leaders_text(leaders: MovingLeaders) -> str:
     "speed |x_j'| <= 0.5; any |d_k| <= 1 of followers"
     """
     speed = "|v_j|" if leaders.growth else "|x_j'|"
+    if leaders.clipped and leaders.saturation is not None:
+        return f"inputs are clipped to [-{near(leaders.saturation)}, {near(leaders.saturation)}]"
     clauses = [f"speed {speed} <= {near(leaders.speed)}" if leaders.speed else "at rest"]
     if leaders.growth:
         own = f"x' = f(x) + {'v or ' if leaders.speed else ''}u, any odd f"

@@ -270,6 +270,7 @@ def _asked(certificate: Certificate, facts: Sequence[Fact]) -> tuple[str, Fact |
     messages = None if late is None else late.messages
     parts = {
         "moving leaders": leaders is not None and leaders.speed > 0,
+        "clipped inputs": leaders is not None and leaders.saturation is not None,
         "growth": leaders is not None and leaders.growth is not None,
         "disturbances": leaders is not None and leaders.disturbance > 0,
     }

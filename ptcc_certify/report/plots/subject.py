@@ -161,6 +161,7 @@ def ideal_text(certificate: Certificate) -> str:
         "no limits": certificate.limits or (late is not None and late.messages.gain_cap is not None),
         without_flaws(None if late is None else late.messages): late is not None and not late.messages.exact,
         "leaders at rest": leaders is not None and leaders.speed > 0,
+        "no clipping": leaders is not None and leaders.saturation is not None,
         "no growth": leaders is not None and leaders.growth is not None,
         "no disturbances": leaders is not None and leaders.disturbance > 0,
     }
@@ -178,8 +179,8 @@ def limits_text(run: Trajectory, certificate: Certificate | None) -> str:
     named = ["vehicles"] * run.vehicles
     named += [f"{name} {near(number)}" for name, number in numbers.items() if number]
     if leaders is not None:
-        values = leaders.speed, leaders.disturbance, leaders.sign_gain, leaders.growth
-        names = "leaders move at up to", "disturbed by up to", "with sign(e) times", "growth"
+        values = leaders.speed, leaders.disturbance, leaders.sign_gain, leaders.growth, leaders.saturation
+        names = "leaders move at up to", "disturbed by up to", "with sign(e) times", "growth", "clipped to"
         words = dict(zip(names, values, strict=True))
         named += [f"{name} {near(number)}" for name, number in words.items() if number]
     if certificate is not None:
