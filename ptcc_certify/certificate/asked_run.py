@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ptcc_certify.bounds.delay.late_messages import LateBounds
+from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.simulation.late_messages import can_run, simulate_late
 from ptcc_certify.simulation.moving_leaders import simulate_tracking
@@ -12,15 +13,17 @@ from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.simulation.virtual_positions import follow, run_virtual_positions
 
 
-def late_run(proof: GraphProof, late: LateBounds, **options: Any) -> Trajectory | None:
+def late_run(proof: GraphProof | FamilyProof, late: LateBounds, **options: Any) -> Trajectory | None:
     """Return the run of what is proved of one graph with late messages or moving leaders, from its initial state.
+
+    Of a graph that has something proved as a family of one mode there is one where nothing is late or off.
 
     Messages are as late as allowed, leaders move away from the farthest follower as fast as they may, and vehicles that
     exchange virtual positions track the run of these.
 
     Parameters
     ----------
-    proof : GraphProof
+    proof : GraphProof or FamilyProof
         With an initial state.
     late : LateBounds
         What is proved.
@@ -31,7 +34,7 @@ def late_run(proof: GraphProof, late: LateBounds, **options: Any) -> Trajectory 
     Returns
     -------
     Trajectory or None
-        None where delays are too short for one.
+        None where delays are too short for one, and of families.
 
     Raises
     ------
@@ -45,8 +48,11 @@ def late_run(proof: GraphProof, late: LateBounds, **options: Any) -> Trajectory 
     >>> late_run(cert.proof, cert.late).states[:, -1].round(3)
     array([1., 1.])
     """
-    graph, protocol, messages = proof.graph, proof.protocol, late.messages
-    start = [float(x) for x in proof.require_initial_state()]
+    graph, protocol, messages = late.graph, proof.protocol, late.messages
+    if graph is None or (isinstance(proof, FamilyProof) and (late.forms or not late.tracks)):
+        return None
+    assert proof.initial_state is not None
+    start = [float(x) for x in proof.initial_state]
     if late.tracks and late.leaders is not None:
         u = late.rows[0].witness.u if late.rows else None
         return simulate_tracking(graph, protocol, late.leaders, start, u=u, gain_cap=messages.gain_cap, **options)

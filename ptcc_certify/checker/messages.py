@@ -45,7 +45,10 @@ OF_ONE_GRAPH = ("steps", *AT_REST)
 
 @dataclass(frozen=True, kw_only=True)
 class RowsBound:
-    """A bound by rows; ``drift`` and ``after`` where leaders move, ``start`` and ``turn`` where inputs are clipped."""
+    """A bound by rows.
+
+    ``drift`` and ``after`` where leaders move, ``start``, ``turn`` and ``level`` where inputs are clipped.
+    """
 
     cap: Positive | None = None
     clock: Fraction | None = None
@@ -56,6 +59,7 @@ class RowsBound:
     after: Fraction | None = None
     start: Fraction | None = None
     turn: NotNegative | None = None
+    level: NotNegative | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -192,8 +196,8 @@ def _check_rows(
     cap, clock, left, initial, floor = entry.cap, entry.clock, entry.left, entry.initial, entry.floor
     for x in (entry.drift, entry.after):
         need((x is None) == (messages.leaders is None), "drift and after are told iff leaders move")
-    for x in (entry.start, entry.turn):
-        need((x is None) == (messages.saturation is None), "start and turn are told iff inputs are clipped")
+    for x in (entry.start, entry.turn, entry.level):
+        need((x is None) == (messages.saturation is None), "start, turn and level are told iff inputs are clipped")
     obligation = doc.open("late-rows", of)
     q, b = obligation["q"], obligation["b"]
     need(q > 1 or (q == 1 and messages.delay == 0), "q is not above 1")
@@ -219,21 +223,30 @@ def _check_rows(
 def _clipped(messages: Messages, rows: Rows, b: Fraction, entry: RowsBound) -> Fraction:
     """Verify ``initial``, though inputs are clipped; return what bounds ``|x_k(0) - x*_k| / u_k`` then.
 
-    Up to ``turn`` that falls by ``saturation/max u`` per unit of time, from there on by ``e^(-b s)``: what ``u`` makes
-    of inputs is clipped no more, for ``b k >= 1``.
+    Up to ``turn`` that falls evenly to ``level``, no faster than ``b g`` times itself and ``saturation/max u`` let it;
+    from there on by ``e^(-b s)``: what ``u`` makes of inputs is clipped no more. ``g`` times a line that comes to 0 by
+    ``T`` falls, and so does ``g e^(-b s)``, for ``b k >= 1``.
     """
-    start, turn, gain = entry.start or Fraction(0), entry.turn or Fraction(0), messages.gain
+    start, turn, level, gain = *(x or Fraction(0) for x in (entry.start, entry.turn, entry.level)), messages.gain
     assert messages.saturation is not None
-    speed = messages.saturation * rows.scale / max(rows.u)
-    bits = length((start, turn, speed, b, entry.initial, gain.T, gain.rho1, gain.k, messages.gain_cap or b))
+    most = messages.saturation * rows.scale / max(rows.u)
+    bits = length((start, turn, level, most, b, entry.initial, gain.T, gain.rho1, gain.k, messages.gain_cap or b))
     spend(100, bits, bits, "inputs that are clipped")
     need(turn < gain.T and b * gain.k >= 1, "turn is not before T, or b k is below 1")
-    level, acts = start - speed * turn, gain.value(1 - turn / gain.T)
+    acts = gain.value(1 - turn / gain.T)
     acts = acts if messages.gain_cap is None else min(acts, messages.gain_cap)
-    need(level >= 0 and b * acts * level <= speed, "inputs are clipped at the turn")
-    passed = Limits(messages.gain_cap, gain.T - turn).clock_above(gain) if turn else Fraction(0)
-    need(b * passed <= LARGEST_GROWTH, "the turn is too late")
-    need(entry.initial >= level * exp(rounded(b * passed, BITS, up=True), BITS)[1], "initial is not proved")
+    need(b * acts * level <= most, "inputs are clipped at the turn")
+    if not turn:
+        need(level >= start, "level is not start")
+        need(entry.initial >= level, "initial is not proved")
+        return start
+    speed = (start - level) / turn
+    need(
+        0 <= speed <= min(most, b * acts * level) and start <= speed * gain.T, "it does not fall so fast up to the turn"
+    )
+    passed = b * Limits(messages.gain_cap, gain.T - turn).clock_above(gain)
+    need(passed <= LARGEST_GROWTH, "the turn is too late")
+    need(entry.initial >= level * exp(rounded(passed, BITS, up=True), BITS)[1], "initial is not proved")
     return start
 
 

@@ -11,11 +11,11 @@ and followers are pushed by ``d gain(t)/g``: within the limits of ``v`` and ``d`
 Where agents move by themselves ``f(x) = growth x``, by which they part fastest: over a step that multiplies positions
 and ``eps`` by ``e^(growth dt)``, and what drives them is as much less before.
 
-Inputs that are clipped to ``U`` move ``eps`` by ``clip(g e, U)`` per unit of time, ``g`` the mean gain of the step, in
-steps of Runge and Kutta.
+Inputs clipped to ``U`` move ``eps`` by ``clip(g e, U)`` per unit of time, ``g`` the mean gain of the step, in steps of
+Runge and Kutta.
 
-So without these and the sign term every run is a solution, up to rounding. The sign term is held over steps, at a value that
-``mu sign(e)`` takes where the step ends: of any within ``mu`` where ``e`` is 0 there, so that it stays 0.
+So without these and the sign term every run is a solution, up to rounding. The sign term is held over steps, at a value
+that ``mu sign(e)`` takes where the step ends: of any within ``mu`` where ``e`` is 0 there, so that it stays 0.
 """
 
 from __future__ import annotations

@@ -16,9 +16,9 @@ Where nothing is late and the gain has no cap this is 0 at ``T``, and with ``p =
 
 A sign term takes it up: followers that are on their targets at ``T`` stay there.
 
-Where inputs are clipped to ``U``, ``|x_k - x_k*|`` is at most ``u_k (start - U t/max u)`` first, for some row of the
-maximum that is clipped moves at ``U``, and others do not need to; and once ``b gain`` times this is at most ``U/max u``
-it decays as above, if ``b rho2 kappa >= 1``. Both are below ``initial e^(-b s)``, ``initial`` what makes this so.
+Where inputs are clipped to ``U``, ``|x_k - x_k*| <= u_k y`` with ``y' = -min(b gain y, U/max u)``: a row of the maximum
+moves towards its target by its input, or by ``U`` if that is clipped. So ``y`` falls evenly first; and once ``b gain
+y`` is at most ``U/max u`` it decays as above, for ``b rho2 kappa >= 1``. ``initial e^(-b s)`` bounds it at all times.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ SEARCHED_FOLLOWERS = 3000
 _TRIED, _LARGEST_Q, _LOSSES = 10, 1e9, (0.01, 0.2, 0.6)
 #: The same where inputs are clipped: an even vector is what matters, as long as ``b rho2 kappa >= 1``.
 LOSSES_CLIPPED = (0.01, 0.2, 0.4, 0.6, 0.75, 0.85, 0.92, 0.96, 0.98, 0.99, 0.995, 0.999)
-#: Halvings by which is found when inputs are clipped no more.
-_HALVINGS = 60
+#: The share of the speed that inputs allow at which bounds fall, and halvings by which is found until when.
+_SLOWER, _HALVINGS = 1 - Fraction(1, 2**20), 100
 #: The largest exponent of what grows after ``T``, in floats.
 _LARGEST_EXPONENT = 700.0
 #: The share of the time that is left where bounds of followers of moving leaders are compared.
@@ -72,9 +72,8 @@ class RowBound:
         From above.
     drift, after : Fraction or None
         What leaders that move, and disturbances, add to ``floor`` at ``T``, and at all times; None where leaders rest.
-    start, turn : Fraction or None
-        Where inputs are clipped: the largest ``|x_k(0) - x_k*| / u_k``, and until when that falls by ``U/max u`` per
-        unit of time.
+    start, turn, level : Fraction or None
+        Where inputs are clipped: the largest ``|x_k(0) - x_k*| / u_k``, and until when that falls evenly, to what.
     """
 
     witness: RowWitness
@@ -87,6 +86,7 @@ class RowBound:
     after: Fraction | None = None
     start: Fraction | None = None
     turn: Fraction | None = None
+    level: Fraction | None = None
 
     def stays(self, case: LateCase) -> bool:
         """Whether what is left at ``T`` is never exceeded: nothing is, or growth is slower than the decay then."""
@@ -116,9 +116,9 @@ class RowBound:
         u[case.followers, 0] = self.witness.u
         floor = lasting(case, self.witness.b, u * float(self.floor), t, case.growth)
         falls = float(self.initial) * y + added
-        if self.start is not None and self.turn is not None and case.exact.saturation is not None:
-            first = float(self.start) - float(case.exact.saturation) / float(self.witness.u.max()) * t
-            falls = np.where(t < float(self.turn), np.minimum(falls, first * MORE), falls)
+        if self.turn and self.start is not None and self.level is not None:
+            line = float(self.start) - float(self.start - self.level) * t / float(self.turn)
+            falls = np.where(t < float(self.turn), np.minimum(falls, line * MORE), falls)
         return Moments(float(self.witness.b), y, u * falls, floor)
 
     def highest_floor(self, case: LateCase) -> Fraction:
@@ -320,31 +320,36 @@ def _best_q(case: LateCase, rows: FollowerRows) -> float:
     return best
 
 
-def _clipped(
-    case: LateCase, witness: RowWitness, start: Fraction, speed: Fraction
-) -> tuple[Fraction, Fraction, Fraction]:
-    """Return ``start``, ``turn`` and ``initial`` of a witness where inputs are clipped.
+def _clipped(case: LateCase, witness: RowWitness, start: Fraction, most: Fraction) -> tuple[Fraction, ...]:
+    """Return ``turn``, ``level`` and ``initial`` of a witness where inputs are clipped, ``most = U/max u``.
 
     Raises
     ------
     NoCertificate
         ``b rho2 kappa`` is below 1, or ``start`` is too large for the inputs.
     """
-    gain, b, cap = case.protocol.gain.exact, witness.b, case.messages.gain_cap
+    gain, b, cap, speed = case.protocol.gain.exact, witness.b, case.messages.gain_cap, most * _SLOWER
 
-    def clipped(t: Fraction) -> bool:
+    def pulled(t: Fraction) -> Fraction:
         acts = gain.value(1 - t / gain.T)
-        return b * min(acts, cap or acts) * (start - speed * t) > speed
+        return b * min(acts, cap or acts) * (start - speed * t)
 
     if b * gain.k < 1 or start >= speed * gain.T:
         raise NoCertificate("inputs that are clipped do not bring them there, as far as is proved")
-    low, turn = Fraction(0), start / speed if clipped(Fraction(0)) else Fraction(0)
-    for _ in range(_HALVINGS if turn else 0):
-        middle = rounded((low + turn) / 2, BITS, up=True)
-        low, turn = (middle, turn) if clipped(middle) else (low, middle)
-    passed = Fraction(0) if not turn else Limits(cap, gain.T - turn).clock_above(gain)
-    grown = rounded(exp(rounded(b * passed, BITS, up=True), BITS)[1], BITS, up=True)
-    return start, turn, rounded((start - speed * turn) * grown, BITS, up=True)
+    if pulled(Fraction(0)) <= most:
+        return Fraction(0), start, start
+    low, high = Fraction(0), start / speed
+    turn = rounded(high / 2, BITS)
+    for _ in range(_HALVINGS):
+        if speed <= pulled(turn) <= most:
+            break
+        low, high = (turn, high) if pulled(turn) > most else (low, turn)
+        turn = rounded((low + high) / 2, BITS)
+    else:
+        raise NoCertificate("when inputs are clipped no more lies too near to T")
+    level = start - speed * turn
+    passed = rounded(b * Limits(cap, gain.T - turn).clock_above(gain), BITS, up=True)
+    return turn, level, rounded(level * exp(passed, BITS)[1], BITS, up=True)
 
 
 def row_bound(case: LateCase, rows: FollowerRows, first: np.ndarray, witness: RowWitness) -> RowBound:
@@ -367,8 +372,8 @@ def row_bound(case: LateCase, rows: FollowerRows, first: np.ndarray, witness: Ro
     stands = Fraction(floor * MORE) * more
     row = RowBound(witness, cap, case.clock(cap), case.left(witness.b, cap), initial, stands)
     if (most := case.exact.saturation) is not None:
-        start, turn, initial = _clipped(case, witness, initial, most / Fraction(float(witness.u.max())))
-        row = replace(row, start=start, turn=turn, initial=initial)
+        turn, level, reached = _clipped(case, witness, initial, most / Fraction(float(witness.u.max())))
+        row = replace(row, start=initial, turn=turn, level=level, initial=reached)
     if case.leaders is None:
         return row
     push = case.push / Fraction(float(witness.u.min())) * grown

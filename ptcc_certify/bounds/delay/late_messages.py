@@ -114,6 +114,11 @@ class LateBounds:
         return self.case.structure
 
     @property
+    def graph(self) -> SignedDigraph | None:
+        """The one graph; None of a family of others."""
+        return self.structure.graph
+
+    @property
     def tracks(self) -> bool:
         """Whether leaders move, and nothing is late, lost or rounded."""
         return self.messages.tracks

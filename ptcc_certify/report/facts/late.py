@@ -131,8 +131,9 @@ def _tracking(late: LateBounds, leaders: MovingLeaders, at: Fraction | None) -> 
     within = ", ".join(f"{_bound_text(late, x, 2)} of it at {when}" for when, x in zip(instants, bounds, strict=True))
     yield Fact(head=head, note=f"before T within {within}{whole}")
     if late.inputs is not None:
-        largest = float(late.inputs.max())
-        text = f"bounded up to T; |u_k| <= {up(largest, 4) if largest else 0}{whole}"
+        largest, most = float(late.inputs.max()), leaders.saturation
+        size = near(most) if most is not None and largest >= most else up(largest, 4) if largest else "0"
+        text = f"bounded up to T; |u_k| <= {size}{whole}"
         yield Fact(head="input", value=largest, side="up", note=text)
     else:
         note = (f"not proved bounded {leaders.while_told}; ", Change("rho2", late.bounding_rho2), " bounds it")

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 
 from ptcc_certify.bounds.delay.late_messages import LateBounds
 from ptcc_certify.certificate.asked_run import late_run
+from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.errors import Change, ParameterError
 from ptcc_certify.report.plots.decay import NONE, NothingDecays, axis_label
@@ -95,16 +96,16 @@ def plot_tracking(
     if bound.max() < _NOTHING:
         raise NothingDecays(NONE)
     runs: list[tuple[Trajectory, dict[str, Any]]] = []
-    if not certificate.of_family:
-        if x0 is None or certificate.proof.final_state is None:
-            raise ParameterError("the certificate has no initial state to run from; certify with x0")
-        runs = _runs(certificate.graph_proof, late)
+    if not certificate.of_family and (x0 is None or certificate.proof.final_state is None):
+        raise ParameterError("the certificate has no initial state to run from; certify with x0")
+    if x0 is not None:
+        runs = _runs(certificate.proof, late)
     after = runs[-1][0].t if runs else t
     if axis is None:
         small = bounded and max(bound[-1], *late.largest_bound(after[after >= T])) < _SMALL * bound[0]
         axis = "left" if small else "time"
     ax = axes_of(ax)
-    drawn = [_draw_run(ax, certificate.graph_proof, late, run, axis, style) for run, style in runs]
+    drawn = [_draw_run(ax, certificate.proof, late, run, axis, style) for run, style in runs]
     if axis == "time" and runs:
         t = after
         bound = late.largest_bound(t) if bounded else np.full(t.size, np.inf)
@@ -131,13 +132,13 @@ def plot_tracking(
 
 
 def _draw_run(
-    ax: Axes, proof: GraphProof, late: LateBounds, run: Trajectory, axis: str, style: dict[str, Any]
+    ax: Axes, proof: GraphProof | FamilyProof, late: LateBounds, run: Trajectory, axis: str, style: dict[str, Any]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Draw how far the agents of a run are from where they should be; return where on the axis, and how far."""
-    nodes, ends = proof.structure.followers, np.asarray(proof.final_state, dtype=float)
+    nodes = late.followers
     if not nodes.size or late.vehicles is not None or late.of_all:
-        nodes = np.arange(proof.graph.n_nodes)
-    aims = ends[:, None] if run.targets is None else run.targets
+        nodes = np.arange(len(late.labels))
+    aims = np.asarray(proof.final_state, dtype=float)[:, None] if run.targets is None else run.targets
     far = np.abs(run.states - aims)[nodes].max(axis=0)
     place = 1 - run.t / float(proof.protocol.T) if axis == "left" else run.t
     if axis == "left":
@@ -146,13 +147,14 @@ def _draw_run(
     return place, far
 
 
-def _runs(proof: GraphProof, late: LateBounds) -> list[tuple[Trajectory, dict[str, Any]]]:
+def _runs(proof: GraphProof | FamilyProof, late: LateBounds) -> list[tuple[Trajectory, dict[str, Any]]]:
     """Return the runs that are drawn, and how."""
     drawn: list[tuple[dict[str, Any], dict[str, Any]]] = []
     if late.vehicles is not None:
         drawn = [({}, {"color": RUN, "linewidth": 1.1, "label": "vehicles"})]
     elif late.tracks:
-        drawn = [({"steps": 400}, {"color": RUN, "linewidth": 1.1, "label": "worst leaders"})]
+        worst = "worst leaders" if late.leaders is not None and late.leaders.speed else "run"
+        drawn = [({"steps": 400}, {"color": RUN, "linewidth": 1.1, "label": worst})]
     elif not late.messages.age and not late.case.signed:
         drawn = [({}, {**_RUNS["oldest"], "label": "values as far off as allowed"})]
     elif not late.case.signed:
