@@ -164,8 +164,8 @@ def test_the_schema_is_a_strict_schema():
         "LateLMI": {"floor"},
         "LateLMIWitness": {"errors"},
         "LateFamilyForm": {"sizes", "floor", "push", "growth"},
-        "Moving": {"sign_gain", "growth"},
-        "RowsBound": {"cap", "clock", "drift", "after"},
+        "Moving": {"sign_gain", "growth", "saturation"},
+        "RowsBound": {"cap", "clock", "drift", "after", "start", "turn", "level"},
         "VehiclesSection": {"velocity", "input"},
     }
 
