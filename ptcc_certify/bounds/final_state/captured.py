@@ -8,12 +8,12 @@ itself then, and where it shows a constant the others end at ``X_k = X0_k + sum_
     h_C = g g_a,      h_S = -L_SS^-1 L_SC g g_a          for a in a balanced closed component C with camps g,
 
 so that one matrix serves all agents. Several captured agents lead in the graph in which all of them hear nobody.
-Constants move ``X_k`` by at most ``R sum_a |h_ka|``, a length that is reached. Signals that vary move ``x_k`` by
+Constants move ``X_k`` by at most ``R sum_a |h_ka|``, which is reached. Signals that vary move ``x_k`` by
 
     J_k = R sum_a int_0^inf |(e^(-L_F' s) L_F'a)_k| ds   <=   R (M(L_F')^-1 |L_F'A| 1)_k
 
-and no less than constants. The bound is what constants do in the graph of ``|w_kl|``, and ``J_k`` itself where camps
-agree along all walks.
+and no less than constants, with F' who follows then and A who is captured. The bound is what constants do in the graph
+of ``|w_kl|``, and ``J_k`` itself where the walks from each of A to k have one sign.
 """
 
 from __future__ import annotations
@@ -109,6 +109,17 @@ class Reach:
         ``R max_k |h_ka|``, likewise.
     varying : Fraction or float
         ``R sum_k (M(L_F')^-1 |L_F'a|)_k``: at most so much in all for signals that vary.
+
+    References
+    ----------
+    Lemmas 8 and 9 of [Zhu]_ for the graph in which the captured agent hears nobody.
+
+    Examples
+    --------
+    >>> from ptcc_certify import influence
+    >>> worst = influence([("a", "c", 1), ("b", "c", -3)]).ranking()[0]
+    >>> isinstance(worst, Reach), worst.agent, worst.moved_most, worst.total
+    (True, 'b', 'c', Fraction(3, 4))
     """
 
     agent: str
