@@ -81,8 +81,8 @@ def _moves(head: str, what: str, moves: Mapping[str, Number], standing: Standing
     for label, x in sorted(moves.items(), key=lambda item: -item[1]):
         alike[_up(x)].append(labelled(agent_text(label)))
     long, short = list[str](), list[str]()
-    for x, names in alike.items():
-        by = f"by {'' if long or x == '0' else 'up to '}{x}"
+    for size, names in alike.items():
+        by = f"by {'' if long or size == '0' else 'up to '}{size}"
         long.append(f"of {', '.join(names)} {by}")
         short.append(f"of {shorten_list(names, _NAMES)} {by}")
     note, brief = f"moves {what} {', '.join(long)}", (f"moves {what} {shorten_list(short, _SHORT)}",)
