@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import PurePath
@@ -13,6 +14,7 @@ from ptcc_certify.cli.click_options import Command, exact_number
 from ptcc_certify.cli.options import graph_argument, json_option, read, reading_options
 from ptcc_certify.cli.terminal import FIGURES, Screen, print_json, progress, refuse_output, screen_options
 from ptcc_certify.errors import ExitCode, ParameterError
+from ptcc_certify.graphs.rationals import shorten
 
 if TYPE_CHECKING:
     from ptcc_certify.bounds.final_state.of_graph import Influence
@@ -114,7 +116,10 @@ def _of_captured(structure: Structure, text: str, radius: str) -> Answer:
     labels, size = structure.graph.labels, exact_number(radius, "--radius")
     exact = len(labels) <= EXACT_NODES
     if text != "all":
-        agents = [text] if text in labels else [label.strip() for label in text.split(",")]
+        try:
+            agents = [text] if text in labels else [x.strip() for x in next(csv.reader([text], strict=True), [""])]
+        except csv.Error:
+            raise ParameterError(f"--captured: {shorten(text)} names no agents; write A,B, such as a,b") from None
         found = captured(structure, agents, size, exact)
         return Answer(lambda _: captured_facts(found), lambda: _written(asdict(found)), found.to_csv)
     if text in labels:

@@ -213,7 +213,9 @@ def test_the_command_prints_and_writes(tmp_path: Path) -> None:
         (("--captured", "1", "--radius", "far"), "--radius:"),
         (("--radius", "2"), "--radius is of what captured agents show"),
         (("--captured", "1", "-o", "q.png"), "write it to .csv"),
-        (("--captured", ""), "no agent is called ''"),
+        (("--captured", ""), "no agent is captured"),
+        (("--captured", '1,"2'), "names no agents; write A,B"),
+        (("--captured", "1\n2"), "names no agents; write A,B"),
     ],
 )
 def test_bad_questions_are_refused_in_one_line(words: tuple[str, ...], says: str) -> None:
@@ -227,3 +229,5 @@ def test_an_agent_called_all_or_with_a_comma(tmp_path: Path) -> None:
     run = command("influence", str(file), "--captured", "all")
     assert run.code == 2 and run.err.count("\n") == 1 and 'captured("all") or .ranking()' in run.err
     assert command("influence", str(file), "--captured", "x,y").code == 0
+    told = json.loads(command("influence", str(file), "--captured", '"x,y",z', "--json").out)
+    assert told["agents"] == ["x,y", "z"] and told["constant"] == {"all": "0"}
