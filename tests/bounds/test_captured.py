@@ -165,6 +165,30 @@ def test_large_graphs_are_numerical_and_say_so() -> None:
     assert len(ranked) == 302 and ranked[0].total >= ranked[-1].total
 
 
+def test_what_floats_do_not_resolve_is_refused() -> None:
+    """Nearly balanced, listening backward 10^8 times as much: the inverse leaves float64, and rationals do not."""
+
+    def chain(n: int) -> list[tuple[int, int, int]]:
+        return [(k, k + 1, 1) for k in range(n)] + [(k + 1, k, 10**8) for k in range(n)] + [(n, 0, -1)]
+
+    assert ptcc.influence(chain(60)).ranking()[0].largest == 1
+    with pytest.raises(ParameterError, match="too ill-conditioned for floats; give weights of more even size"):
+        ptcc.influence(chain(130)).ranking()
+
+
+def test_the_order_of_nodes_does_not_matter() -> None:
+    graph = ptcc.as_graph([(1, 2, 1), (1, 3, 1), (2, 3, -1), (3, 2, -2), (2, 4, 1)])
+    turned = graph.subgraph([3, 2, 1, 0])
+    assert turned.labels == ("4", "3", "2", "1")
+    for agent in graph.labels:
+        one, other = (ptcc.influence(g).captured(agent) for g in (graph, turned))
+        assert one.constant == other.constant and one.varying == other.varying
+    rows = [
+        {reach.agent: (reach.total, reach.varying) for reach in ptcc.influence(g).ranking()} for g in (graph, turned)
+    ]
+    assert rows[0] == rows[1]
+
+
 def test_who_cannot_be_captured_is_refused() -> None:
     who = ptcc.influence(ENEMIES)
     with pytest.raises(UnknownAgentError, match="no agent is called 'B'; there are a, b, c; did you mean b"):

@@ -31,6 +31,7 @@ from lmi.search_time import checkpoint
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.labels import place_of
+from ptcc_certify.graphs.packed_weights import Weights
 from ptcc_certify.graphs.size_limits import EXACT_NODES, RANKED_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.model.parameters import parameter
@@ -41,6 +42,8 @@ Effects = Iterator[tuple[int, np.ndarray]]
 Solver = Callable[[np.ndarray], np.ndarray]
 #: Columns that are solved for at once in floats.
 _COLUMNS = 256
+#: What ``|h|`` in floats may be: it is 1 at most.
+_ONE = 1 + 1e-6
 
 
 @dataclass(frozen=True)
@@ -220,7 +223,13 @@ def _effects(structure: Structure, exact: bool, agents: Iterable[int] | None = N
             h[S] = solved[:, column]
             if grouped:
                 h[groups[k][0]] = groups[k][1]
-            yield from ((a, h / h[a]) for a in columns[grouped, k])
+            for a in columns[grouped, k]:
+                with np.errstate(all="ignore"):
+                    effect = h / h[a]
+                if not exact and not abs(effect).max() <= _ONE:
+                    mend = f"give weights of more even size, or at most {EXACT_NODES} agents"
+                    raise ParameterError(f"captured agents: the equations are too ill-conditioned for floats; {mend}")
+                yield a, effect
 
 
 def _exact_solver(A: np.ndarray) -> Solver:
@@ -228,7 +237,7 @@ def _exact_solver(A: np.ndarray) -> Solver:
 
 
 def _float_solver(A: Any) -> Solver:
-    """Return what solves for columns, by a factor as soon as Krylov solves fail, whatever fills in."""
+    """Return what solves for columns: by a factor as soon as Krylov solves fail, whatever fills in, or NaN."""
     from lmi.sparse_h_matrix import Factor, solve_columns
 
     factor: Factor | None = None
@@ -239,17 +248,15 @@ def _float_solver(A: Any) -> Solver:
         if solved is None and A.shape[0] <= RANKED_NODES:
             factor = factor or Factor(A)
             solved = np.column_stack([factor.solve(column) for column in B.T])
-        if solved is None or not np.isfinite(solved).all():
-            mend = f"give weights of more even size, or at most {EXACT_NODES} agents"
-            raise ParameterError(f"captured agents: the equations are too ill-conditioned for floats; {mend}")
-        return solved
+        return np.full(B.shape, np.nan) if solved is None else solved
 
     return solve
 
 
 def _absolute(graph: SignedDigraph) -> SignedDigraph:
     """Return the graph of ``|w_kl|``."""
-    return SignedDigraph.from_edges(((a, b, abs(w)) for a, b, w in graph.edges), nodes=graph.labels)
+    sizes = Weights([abs(graph.exact_weight(edge)) for edge in range(graph.n_edges)])
+    return SignedDigraph(graph.labels, graph.source, graph.target, sizes)
 
 
 def _scaled(radius: Fraction, x: Any, exact: bool) -> Number:
