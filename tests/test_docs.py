@@ -51,6 +51,7 @@ IN_ROOMS = {
     "model.reaching_time": ("ReachingTime", "certified_reaching_times"),
     "simulation.trajectory": ("Sliding",),
     "bounds.final_state.of_graph": ("FinalState", "Influence"),
+    "bounds.final_state.captured": ("Captured", "Reach"),
     "bounds.envelope": ("Envelope", "Comparison"),
     "bounds.input.effort": ("Effort",),
     "bounds.input.initial_sets": ("initial_set_within",),

@@ -26,7 +26,7 @@ ROOMS = {
     "checker": ("The independent check", "certificate.checking checker"),
     "bounds": (
         "Bounds: error, final state, input",
-        "bounds.envelope bounds.final_state.of_graph bounds.input.effort "
+        "bounds.envelope bounds.final_state.of_graph bounds.final_state.captured bounds.input.effort "
         "bounds.input.initial_sets bounds.input.worst_initial_state",
     ),
     "simulation": ("Simulation", "simulation.trajectory"),

@@ -275,7 +275,7 @@ class Command(click.Command):
         *("kind", "T", "rho1", "rho2", "kappa", "x0", "seed", "edges", "switching", "expect", "what", "stdlib"),
         *("verified", "workers", "restart", "output", "as_json", "verbose", "port", "no_browser"),
     )
-    few: ClassVar[int] = 15
+    few: ClassVar[int] = 16
 
     def get_help_option(self, ctx: click.Context) -> click.Option | None:
         """Return ``--help``, which takes a topic where there are many options."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ptcc_certify.errors import FormatError, GraphError, ParameterError, UnknownAgentError, quoted
+from ptcc_certify.errors import FormatError, GraphError, ParameterError, UnknownAgentError, did_you_mean, quoted
 from ptcc_certify.graphs.rationals import shorten
 
 if TYPE_CHECKING:
@@ -34,7 +34,8 @@ def position(label: Hashable, labels: Sequence[str]) -> int:
     1
     """
     if str(label) not in labels:
-        raise UnknownAgentError(f"no agent is called {shorten(repr(label))}; there are {first_five(labels)}")
+        near = did_you_mean(str(label), labels)
+        raise UnknownAgentError(f"no agent is called {shorten(repr(label))}; there are {first_five(labels)}{near}")
     return labels.index(str(label))
 
 

@@ -15,6 +15,8 @@ ONE_THREAD_NODES = 400
 DENSE_NODES, FACTOR_NODES = 500, 20_000
 #: Nodes up to which the paper's certificate (dense semidefinite cones) is searched.
 SEARCH_NODES = 150
+#: Agents of which each is captured, one after the other, to rank them.
+RANKED_NODES = 10_000
 #: Nodes up to which a certificate comes with a simulated run unasked.
 SIMULATED_NODES = 10_000
 

@@ -32,6 +32,7 @@ from lmi.child_process import apart
 from lmi.errors import LMIError
 from lmi.search_time import checkpoint, processor_left, seconds_left
 from lmi.sparse_h_matrix import SparseHMatrix, solve
+from ptcc_certify.bounds.final_state.captured import Captured, Reach, captured, ranking
 from ptcc_certify.errors import ParameterError, quoted
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import as_state
@@ -265,6 +266,61 @@ class Influence:
         )
         csv.writer(text, lineterminator="\n").writerows([("node", "leader", "weight"), *rows])
         return text.getvalue()
+
+    def captured(self, *agents: int | str, radius: Any = 1) -> Captured:
+        """Tell how far captured agents, which hear nobody and show what they like, move where the others end.
+
+        Constants within ``[-R, R]`` move agent k by at most ``R sum_a |h_ka|`` to either side, which is reached;
+        signals that vary by at most ``R (M(L_F')^-1 |L_F'A| 1)_k``. Exact where ``self`` is, otherwise numerical.
+
+        Parameters
+        ----------
+        *agents : int or str
+            Indices, or labels if these are texts.
+        radius : Fraction, int, float or str
+            ``R > 0``, in the unit of the states.
+
+        Returns
+        -------
+        Captured
+
+        Raises
+        ------
+        UnknownAgentError, ParameterError
+            There is no such agent; nobody is captured, or everybody; the radius is not positive; floats do not do.
+
+        Examples
+        --------
+        >>> influence([("a", "c", 1), ("b", "c", -3)]).captured("b", radius=2).constant
+        {'a': Fraction(0, 1), 'c': Fraction(3, 2)}
+        """
+        return captured(self.structure, agents, radius, self.exact)
+
+    def ranking(self, radius: Any = 1) -> list[Reach]:
+        """Rank all agents by how far each, captured alone, moves where the others end: the most dangerous first.
+
+        By ``R sum_k |h_ka|`` (see :meth:`captured`), of equals in the order of nodes.
+
+        Parameters
+        ----------
+        radius : Fraction, int, float or str
+            ``R > 0``, in the unit of the states.
+
+        Returns
+        -------
+        list of N Reach
+
+        Raises
+        ------
+        ParameterError
+            There are more than 10,000 agents, or one; the radius is not positive; floats do not do.
+
+        Examples
+        --------
+        >>> influence([("a", "c", 1), ("b", "c", -3)]).ranking()[0]
+        Reach(agent='b', moved_most='c', total=Fraction(3, 4), largest=Fraction(3, 4), varying=Fraction(3, 4))
+        """
+        return ranking(self.structure, radius, self.exact)
 
     @property
     def _counted(self) -> list[int]:
