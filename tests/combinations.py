@@ -36,6 +36,7 @@ PARTS: dict[str, dict[str, Any]] = {
     "rounded values": {"messages": {"value_error": "0.01"}},
     "leaders that move": {"leaders": {"speed": "0.1"}},
     "agents that move by themselves": {"leaders": {"growth": "0.2"}},
+    "inputs that are clipped": {"leaders": {"saturation": 200}},
     "the sliding mode": {"protocol": SLIDING},
     "disturbances without it": {"asks": {"delta": "0.1"}},
     "measurement noise under a gain cap": {"asks": {"noise": "0.01"}, "limits": {"gain_cap": 50}},

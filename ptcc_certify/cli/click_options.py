@@ -104,7 +104,7 @@ def names_of(*kinds: type) -> tuple[str, ...]:
     Examples
     --------
     >>> names_of(MovingLeaders)
-    ('leader_speed', 'sign_gain', 'growth')
+    ('leader_speed', 'sign_gain', 'growth', 'saturation')
     """
     return tuple(told.name for told in options_of(*kinds).values())
 
@@ -115,7 +115,7 @@ def options_asking(names: Iterable[str]) -> tuple[str, ...]:
     Examples
     --------
     >>> options_asking(["initial_set", "leaders"])
-    ('initial_bound', 'leader_speed', 'sign_gain', 'growth')
+    ('initial_bound', 'leader_speed', 'sign_gain', 'growth', 'saturation')
     """
     parts = {"messages": LateMessages, "leaders": MovingLeaders, "limits": GainLimits}
     given = (names_of(parts[name]) if name in parts else (IN_LIBRARY.get(name, name),) for name in names)

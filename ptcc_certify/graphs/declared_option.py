@@ -118,8 +118,8 @@ def options_of(*kinds: Any) -> Mapping[str, Option]:
     Examples
     --------
     >>> from ptcc_certify.model.moving_leaders import MovingLeaders
-    >>> {name: told.key for name, told in options_of(MovingLeaders).items()}
-    {'speed': 'leaders.speed', 'sign_gain': 'leaders.sign_gain', 'growth': 'leaders.growth'}
+    >>> {name: told.key for name, told in options_of(MovingLeaders).items() if name in ("speed", "saturation")}
+    {'speed': 'leaders.speed', 'saturation': 'limits.saturation'}
     """
     found = {}
     for kind in kinds:
