@@ -132,12 +132,13 @@ def family_claims(
     also = " and disturbance" if disturbed else ""
     also += "" if certificate is None else "".join(f", {text}" for text in assumptions(certificate))
     order = sorted(range(len(components)), key=lambda k: -components[k].nodes.size)
+    known = all(component.family.graph is not None for component in components)
     if len(components) == 1:
-        text, longer = _behaviour_texts(components[0], when, also)
+        text, longer = _behaviour_texts(components[0], when, also, known)
         yield Fact(head="claim", value=components[0].sharpest, note=longer[0], brief=(longer[1], text))
     else:
         for k in order[:_COMPONENTS]:
-            text, (_, camps_named) = _behaviour_texts(components[k], when, also)
+            text, (_, camps_named) = _behaviour_texts(components[k], when, also, known)
             text = camps_named if columns(camps_named) <= TEXT else text
             yield _component_fact(components[k].family.labels, components[k].sharpest, text)
         if len(components) > _COMPONENTS:
@@ -151,8 +152,11 @@ def family_claims(
             yield Fact(head="box", note=box_text(components[k], boxes[k]), brief=(brief,), detail=place > 0)
 
 
-def _behaviour_texts(component: FamilyComponent, when: str, also: str) -> tuple[str, tuple[str, str]]:
-    """Tell what a component does, and the same with its camps, of which all agents are named or the first."""
+def _behaviour_texts(component: FamilyComponent, when: str, also: str, known: bool) -> tuple[str, tuple[str, str]]:
+    """Tell what a component does, and the same with its camps, of which all agents are named or the first.
+
+    Of one graph whose weights are ``known`` there is one signal alone.
+    """
     if component.behaviour is None:
         return "not decided", ("not decided",) * 2
     if component.behaviour == DEPENDS:
@@ -160,7 +164,7 @@ def _behaviour_texts(component: FamilyComponent, when: str, also: str) -> tuple[
         return text, (text, text)
     whatever = f" {WHATEVER[component.signal]}"
     if len(component.family.modes) == 1:
-        whatever = "" if component.family.graph is not None else whatever.replace("mode and ", "")
+        whatever = "" if known else whatever.replace("mode and ", "")
     text = f"{component.sharpest}{when}{whatever}{also}"
     sides = component.camps
     if component.behaviour == STABILITY or len(sides) < 2:
