@@ -112,12 +112,7 @@ def check_messages(
         need(not protocol.sliding, "leaders that move under the sliding-mode protocol")
         need(all(getattr(section, key) is None for key in AT_REST), f"one of {', '.join(AT_REST)} though leaders move")
         need(section.steps is None or messages.leaders.sign_gain is None, "steps beside a sign term")
-    if messages.saturation is not None:
-        need(isinstance(of, Family) and section.forms is None, "inputs that are clipped of one graph, or by forms")
-    if messages.growth:
-        carried = isinstance(of, Family) and all(one.carried for one in of.components)
-        need(carried, "agents that move by themselves to targets that are neither 0, a leader nor its opposite")
-        need("formation" not in doc, "agents that move by themselves in a formation")
+    _check_moved(doc, messages, of, section)
     need(len(section.rows) <= MANY_ROWS, f"more than {MANY_ROWS} witnesses of rows")
     by_rows = bool(section.rows) or section.steps is not None
     bounded = by_rows or section.forms is not None
@@ -162,6 +157,16 @@ def check_messages(
             for decay in decays:
                 one.of_all(decay)
             one.close(doc)
+
+
+def _check_moved(doc: Document, messages: Messages, of: Verified | Family, section: MessagesSection) -> None:
+    """Verify that agents may move by themselves, and that inputs may be clipped: of a family, of these targets."""
+    if messages.saturation is not None:
+        need(isinstance(of, Family) and section.forms is None, "inputs that are clipped of one graph, or by forms")
+    if messages.growth:
+        carried = isinstance(of, Family) and all(one.carried for one in of.components)
+        need(carried, "agents that move by themselves to targets that are neither 0, a leader nor its opposite")
+        need("formation" not in doc, "agents that move by themselves in a formation")
 
 
 def _check_one_graph(
