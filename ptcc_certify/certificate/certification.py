@@ -181,7 +181,7 @@ def certify_case(
     refuse_before_the_graph(case)
     progress, structure = listener(progress), None if of_family else analyse(as_graph(case.graph))
     if structure is not None and asked_of_signals(structure, case):
-        of_family, case = True, replace(case, graph=[structure.graph])
+        of_family, case = True, replace(case, graph=[structure.graph]).with_rows(of_family=True)
     family = _read_family(case) if of_family else None
     if structure is None or family is not None:
         assert family is not None
@@ -248,7 +248,7 @@ def _read_family(case: Case) -> Family:
         if case.leaders is not None and case.leaders.growth:
             _refuse_uncarried(family)
         if case.leaders is not None and case.leaders.saturation:
-            refuse_other_targets(family, "inputs that are clipped", "leave the saturation out")
+            refuse_other_targets(family, "inputs that are clipped", "do without saturation")
         if messages is not None:
             asked, late = messages.asked, messages.age > 0 and messages.gain_cap is None
             driven = messages.vehicles is not None and not messages.settles
@@ -267,8 +267,10 @@ def _refuse_uncarried(family: Family) -> None:
     for component in decide(family):
         if component.behaviour not in (STABILITY, BIPARTITE_CONSENSUS):
             one = shorten(component.family.labels[int(listeners(component.family)[0])])
-            why = "leave growth out, or let followers hear one leader, in ways that agree"
-            raise HypothesisError(f"agents move by themselves, and not all targets about {one} are leaders: {why}")
+            why = "its leaders are several, or paths from one disagree; do without growth"
+            raise HypothesisError(
+                f"agents that move by themselves do not stay at the mean that {one} is drawn to: {why}"
+            )
 
 
 def _refuse_before_reading(case: Case) -> None:

@@ -159,6 +159,13 @@ class FamilyProof(Proof):
         return behaviour + (" for every signal" if every else "")
 
     @property
+    def ends(self) -> list[Interval] | None:
+        """Where agents end, as middles and radii; None where some end is not known."""
+        known = [pair for pair in self.final_state or () if pair is not None]
+        middles = [((low + high) / 2, (high - low) / 2) for low, high in known]
+        return middles if len(known) == self.family.n_nodes else None
+
+    @property
     def main_figure(self) -> str:
         """The figure that is drawn where none is named: the decay, or the states where nothing of one is proved.
 

@@ -164,7 +164,8 @@ def _first_share(proof: GraphProof | FamilyProof) -> Fraction:
     gain, late, limits = proof.protocol.gain, proof.late, proof.limits
     caps = [] if late is None or late.messages.gain_cap is None else [late.messages.gain_cap]
     tops = [*caps, *(entry.largest_gain(gain.exact) for entry in limits)]
-    return min([Fraction(1), *(top / gain.first for top in tops)])
+    clipped = late is not None and late.case.exact.saturation is not None  # whose first input says nothing
+    return Fraction(0) if clipped else min([Fraction(1), *(top / gain.first for top in tops)])
 
 
 def judge_limits(proof: GraphProof) -> list[Answer]:

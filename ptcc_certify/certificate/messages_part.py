@@ -56,9 +56,7 @@ def _ends(proof: GraphProof | FamilyProof) -> Sequence[Interval] | None:
     """Return where agents end, as middles and radii that a file states; None where some end is not known."""
     if isinstance(proof, GraphProof):
         return stated_ends(proof.influence, proof.final_state, proof.initial_state)
-    known = [pair for pair in proof.final_state or () if pair is not None]
-    middles = [((low + high) / 2, (high - low) / 2) for low, high in known]
-    return middles if len(known) == proof.family.n_nodes else None
+    return proof.ends
 
 
 def _longest_delay(certificate: Certificate, late: LateBounds, asked: Fraction) -> Fraction | None:

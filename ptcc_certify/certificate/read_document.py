@@ -68,7 +68,11 @@ def read_document(source: Source) -> tuple[GraphProof | FamilyProof, Observation
         "offsets": tuple(sections["formation"].offsets) if "formation" in sections else None,
     }
     if isinstance(subject, Family):
-        return _read_family_proof(source, subject, words), Observations()
+        proof = _read_family_proof(source, subject, words)
+        if proof.late is not None and not proof.late.says_something:  # why is told from where agents begin and end
+            case = replace(proof.late.case, initial_state=state, ends=proof.ends)
+            proof = replace(proof, late=replace(proof.late, case=case))
+        return proof, Observations()
     return _read_graph_proof(source, subject, words), read_observations(document["unverified"])
 
 

@@ -23,7 +23,7 @@ from ptcc_certify.checker.input_formulas import BITS, Limits, drift_above
 from ptcc_certify.checker.message_ages import LARGEST_GROWTH, Delays, Messages, Moving, check_delays, need_left
 from ptcc_certify.checker.missed_deadline import MissedDeadline, check_missed, check_staged
 from ptcc_certify.checker.protocol import Begin, Protocol
-from ptcc_certify.checker.reading import length, need
+from ptcc_certify.checker.reading import RejectedError, length, need
 from ptcc_certify.checker.section_declarations import (
     Agents,
     ByFollower,
@@ -164,7 +164,9 @@ def _check_moved(doc: Document, messages: Messages, of: Verified | Family, secti
     if messages.saturation is not None:
         need(isinstance(of, Family) and section.forms is None, "inputs that are clipped of one graph, or by forms")
     if messages.growth:
-        carried = isinstance(of, Family) and all(one.carried for one in of.components)
+        if not isinstance(of, Family):
+            raise RejectedError("agents that move by themselves of one graph, which is a family of one mode")
+        carried = all(one.carried for one in of.components)
         need(carried, "agents that move by themselves to targets that are neither 0, a leader nor its opposite")
         need("formation" not in doc, "agents that move by themselves in a formation")
 

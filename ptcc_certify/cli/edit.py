@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import click
@@ -51,9 +52,12 @@ def edit(
 
     if not (without_nodes or without_edges):
         raise ParameterError("nothing is left out; give --without-node NODE or --without-edge SOURCE,TARGET")
+    if output is not None and Path(output).suffix.lower() not in (".csv", ".txt"):
+        raise ParameterError(f"{output}: rows source,target,weight are written to .csv or .txt; choose one of these")
     refuse_output(output)
     whole = read(graph, options)
-    smaller = whole.without_edges(*without_edges).without_nodes(*without_nodes)
+    nodes = [text if text in whole.labels else text.removeprefix('"').removesuffix('"') for text in without_nodes]
+    smaller = whole.without_edges(*without_edges).without_nodes(*nodes)
     if output is None:
         click.echo(edge_list(smaller, "standard output"), nl=False)
         return ExitCode.OK

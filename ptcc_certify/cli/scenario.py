@@ -311,8 +311,9 @@ def refuse_beside(scenario: Scenario | None, command: str) -> None:
         return
     for option in BESIDE:
         if scenario.options.get(option) not in (None, False):
-            of_leaders = option in names_of(MovingLeaders)
-            what, figure = ("leaders that move", "tracking") if of_leaders else ("late messages", "late")
+            what, figure = "late messages", "late"
+            if option in names_of(MovingLeaders):
+                what, figure = "leaders that move" if option in ("leader_speed", "sign_gain") else option, "tracking"
             mend = f"ptcc certify -o c.json proves it, ptcc plot c.json --what {figure} runs it"
             raise ParameterError(f"{scenario.place(option)}: ptcc {command} does not take {what}; {mend}")
 

@@ -240,7 +240,7 @@ def _run_beside(
     if leaders is None and protocol.reaching is None and options["delta"]:
         leaders = MovingLeaders(speed=0, disturbance=options["delta"])
     source = click.get_current_context().get_parameter_source
-    name = "late messages" if messages else "leaders that move"
+    name = "late messages" if messages else "leaders that move" if leaders is None else leaders.asked
     refused = ["steps", "boundary_layer", "stop_before", "sample_period"]
     if protocol.reaching is None:
         refused += ["delta", "disturbance"] if leaders is None else ["disturbance"]
@@ -250,6 +250,8 @@ def _run_beside(
         given.append("dimension")
     if given:
         raise ParameterError(f"{flag_of(given[0])}: is not simulated with {name}; leave it out")
+    if leaders is not None and leaders.growth is not None and places is not None:
+        raise ParameterError("--growth is not for formations, whose places it changes; leave one of the two out")
     families.refuse_restricted(options)
     if options["noise"] is not None:  # what is heard is off by it
         asks, limits = Asks(noise=options["noise"]), shared.limits_of(options)

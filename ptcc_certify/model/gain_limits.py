@@ -1,4 +1,4 @@
-"""Limits of the gain: saturation, switch-off before the deadline, zero-order hold."""
+"""Limits of the gain: a cap, switch-off before the deadline, zero-order hold."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 @gated
 @dataclass(frozen=True, repr=False)
 class GainLimits(Parameters, Limits):
-    """What an actuator leaves of a gain: saturation, switch-off, zero-order hold; None for what it does not.
+    """What an actuator leaves of a gain: a cap, switch-off, zero-order hold; None for what it does not.
 
     Parameters
     ----------

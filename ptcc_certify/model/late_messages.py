@@ -209,13 +209,8 @@ lambda of L, or measure the own state without delay
 
     @property
     def asked_of_leaders(self) -> str:
-        """What is asked by their leaders, in words: that they move, disturbances, or a cap alone."""
-        if self.leaders is not None and not self.leaders.idle:
-            own = self.leaders
-            asked: dict[str, Any] = {"leaders that move": own.speed, "disturbances": own.disturbance}
-            asked |= {"inputs that are clipped": own.saturation, "agents that move by themselves": own.growth}
-            return next(name for name, given in asked.items() if given)
-        return "a gain cap"
+        """What is asked by their leaders, in words."""
+        return "a gain cap" if self.leaders is None else self.leaders.asked
 
     def latencies(self, of: SignedDigraph | Family) -> Fraction | tuple[Fraction, ...]:
         """Return what messages take: one number, or one for every ordered pair of an edge, in the order of these.

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from lmi.exact.decimal_rounding import near
 from ptcc_certify.errors import ParameterError, gated
@@ -120,6 +120,13 @@ give 2 or more
     def idle(self) -> bool:
         """Whether leaders rest, and nothing moves, disturbs or limits anybody."""
         return not (self.total or self.growth or self.saturation or self.sign_gain is not None)
+
+    @property
+    def asked(self) -> str:
+        """What is asked, in words: that leaders move, disturbances and so on, or a cap alone."""
+        given: dict[str, Any] = {"leaders that move": self.speed, "disturbances": self.disturbance}
+        given |= {"inputs that are clipped": self.saturation, "agents that move by themselves": self.growth}
+        return next((name for name, there in given.items() if there), "a gain cap")
 
     @property
     def clipped(self) -> bool:

@@ -43,7 +43,7 @@ _NOT_LATE = {
     "sample_period": "of late messages a period tells how often they are sent; give that instead",
     "delta": "is given twice: MovingLeaders(disturbance=..) tells what disturbs the followers; leave one of them out",
 }
-_CAPPED = "followers of leaders that move are certified under one gain cap alone; leave others out"
+_CAPPED = "beside what moves, disturbs or clips followers one gain cap alone is certified; leave others out"
 #: What is not certified beside leaders that move.
 _NOT_TRACKING = {
     "initial_set": _NO_SET,
@@ -112,7 +112,7 @@ def refuse_of_families(case: Case) -> None:
         if case.agents.biases is not None:
             raise ParameterError("biases", "of a family make other places in every graph; give offsets instead")
         if case.leaders is not None and case.leaders.growth is not None:
-            raise ParameterError("growth", "at other places moves agents otherwise; leave it or the formation out")
+            raise ParameterError("growth", "is not for formations, whose places it changes; leave one of the two out")
     if given:
         mend = {"limits": "families take one gain cap alone; leave others out", "delta": _NOT_LATE["delta"]}
         text = "is not for families of graphs yet, nor for what one graph has proved as one; leave it out"
@@ -198,7 +198,9 @@ def _refuse_beside_any_graph(case: Case) -> None:
         raise ParameterError("max_residual", "is asked of late messages; tell how late they are, or leave it out")
     refuse_together(case.messages, case.leaders)
     if case.leaders is not None and case.sliding:
-        raise ParameterError("leaders that move are certified under the nominal protocol; change it, or leave them out")
+        raise ParameterError(
+            f"{case.leaders.asked} are certified under the nominal protocol; change it, or leave them out"
+        )
 
 
 def refuse_beside(structure: Structure, case: Case) -> None:
@@ -212,7 +214,7 @@ def refuse_beside(structure: Structure, case: Case) -> None:
     if leaders is not None:
         if messages is None or messages.leaders is None:
             raise ParameterError("leaders", "that move are not certified of these agents; leave them out")
-        refuse_leader_groups(structure, "leaders that move as they like: a bound")
+        refuse_leader_groups(structure, f"{leaders.asked}: a bound")
     if messages is not None:
         _refuse_messages(structure, messages, [limit.gain_cap for limit in case.limits])
     if structure.graph.n_edges == 0:
@@ -248,7 +250,8 @@ def refuse_together(messages: LateMessages | None, leaders: MovingLeaders | None
     Raises
     ------
     ParameterError
-        The own states of followers are late, or messages where agents move by themselves.
+        The own states of followers are late, messages where agents move by themselves, or inputs are clipped beside
+        what is not proved with them.
 
     Examples
     --------
@@ -257,17 +260,14 @@ def refuse_together(messages: LateMessages | None, leaders: MovingLeaders | None
     ptcc_certify.errors.ParameterError: own_delay: an own state that is late is certified of leaders at rest alone; \
 leave one of the two out
     """
-    if messages is None or leaders is None:
-        return
-    if leaders.saturation is not None:
-        beside: dict[str, Any] = {
-            "late messages": messages.age,
-            "leaders that move": leaders.speed,
-            "growth": leaders.growth,
-        }
-        beside |= {"disturbances": leaders.disturbance, "a sign term": leaders.sign_gain}
+    if leaders is not None and leaders.saturation is not None:
+        beside: dict[str, Any] = {"late messages": messages is not None and messages.age, "growth": leaders.growth}
+        beside |= {"leaders that move": leaders.speed, "disturbances": leaders.disturbance}
+        beside |= {"a sign term": leaders.sign_gain}
         if what := next((name for name, given in beside.items() if given), None):
             raise ParameterError("saturation", f"beside {what} is not certified yet; leave one of the two out")
+    if messages is None or leaders is None:
+        return
     if messages.age and leaders.growth:
         why = "a target that moves by itself goes on while messages come, and nothing tells how far"
         raise ParameterError("growth", f"beside late messages is not certified: {why}; leave one of the two out")

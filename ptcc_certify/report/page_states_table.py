@@ -114,9 +114,11 @@ def _of_family(saved: Certificate) -> tuple[str, list[Any], list[str]]:
     which = "every signal" if every else "these signals"
     which += "" if saved.protocol.reaching is None else " and disturbance"
     last = "State at the deadline" if rests(saved) else "State at any instant"
-    caption = f"Where the agents end{_assumed(saved)}, proved for {which if every else 'signals that keep the promise'}"
+    told, whom = f", proved for {which if every else 'signals that keep the promise'}", f", for {which}"
+    if saved.family_proof.family.graph is not None:
+        told = whom = ""
     written = [(texts.label(name), *cells, end or _ends(None)) for name, *cells, end in rows]
-    return caption, written, [*heads, f"{last}{agreement_text(saved)}, for {which}"]
+    return f"Where the agents end{_assumed(saved)}{told}", written, [*heads, f"{last}{agreement_text(saved)}{whom}"]
 
 
 def state_rows(saved: Certificate) -> list[tuple[str, str, str, str | None]]:

@@ -120,6 +120,10 @@ def simulate_late(
     if word not in PATTERNS:
         raise ParameterError(f'pattern "{shorten(str(word))}" is unknown; one of {", ".join(PATTERNS)}')
     refuse_no_protocol(protocol)
+    leaders = told_leaders(messages, leaders) if isinstance(messages, LateMessages) else leaders
+    for name in ("growth", "saturation"):
+        if getattr(leaders, name, None) is not None:
+            raise ParameterError(name, "is simulated of values that are neither late nor off; leave it out, or these")
     if not isinstance(messages, LateMessages):
         raise ParameterError("messages", f"= {shorten(repr(messages))} is none; give LateMessages(delay='0.01'), say")
     if leaders is not None and not isinstance(leaders, MovingLeaders):

@@ -34,13 +34,15 @@ from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.model.base import Protocol, refuse_no_protocol
 from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.moving_leaders import MovingLeaders
-from ptcc_certify.model.refusals import refuse_leader_groups
+from ptcc_certify.model.refusals import refuse_leader_groups, refuse_together
 from ptcc_certify.simulation.cvodes import Tolerances
 from ptcc_certify.simulation.instants import MOST_STEPS, STEP_SHARE, Instants, steps_towards
 from ptcc_certify.simulation.trajectory import JUST_BEFORE, Conditions, Setup, Trajectory
 
 #: Steps up to T; how near they come; where a run ends.
 STEPS, NEAREST, PAST = 800, 1e-7, 0.5
+#: Growth times ``T`` at most: floats end at ``e^709``.
+_LARGEST_GROWTH = 400
 #: Iterations for a sign term at most, and what they may change of it at last, relative to its gain.
 _ITERATIONS, _CONVERGED = 1000, 1e-12
 
@@ -76,7 +78,8 @@ class WorstLeaders:
         if not isinstance(leaders, MovingLeaders) or protocol.reaching:
             mend = "give it, and MovingLeaders(speed=1), say"
             raise ParameterError(f"leaders that move run under the nominal protocol; {mend}")
-        refuse_leader_groups(structure, "leaders that move as they like: a run")
+        refuse_together(None, leaders)
+        refuse_leader_groups(structure, f"{leaders.asked}: a run")
         n, F = structure.graph.n_nodes, structure.followers
         if n > EXACT_NODES:
             raise ParameterError(f"runs with moving leaders are of up to {EXACT_NODES} agents; the graph has {n}")
@@ -173,6 +176,10 @@ def simulate_tracking(
     np.True_
     """
     refuse_no_protocol(protocol)
+    if isinstance(leaders, MovingLeaders) and (leaders.growth or 0) * protocol.T > _LARGEST_GROWTH:
+        raise ParameterError(
+            "growth", f"times T is above {_LARGEST_GROWTH}: states leave the range of floats; give less"
+        )
     structure, steps = analyse(as_graph(graph)), whole_number(steps, "steps", 2, MOST_STEPS)
     worst = WorstLeaders(structure, protocol, leaders, u)
     F, heads = worst.followers, worst.heads
@@ -221,11 +228,10 @@ class _Step:
 
     def __call__(self, eps: np.ndarray, ds: float, gain: float, dt: float) -> tuple[np.ndarray, np.ndarray]:
         """Return by how much leaders move, and the deviations after the step."""
-        rest = np.zeros(self.worst.heads.size)
         if np.isinf(gain):
-            return rest, eps + self.clip(-eps, dt)
-        if np.abs(self.L_F @ eps).max() * gain > self.saturation:
-            return rest, self._clipped(eps, ds, dt)
+            return np.zeros(self.worst.heads.size), eps + self.clip(-eps, dt)
+        if np.abs(self.L_F @ eps).max() * gain > self.saturation:  # beside which nothing else acts
+            return np.zeros(self.worst.heads.size), self._clipped(eps, ds, dt)
         v = self.worst.velocities(eps)
         push, E = self.worst.pushes(eps) - self.worst.Q @ v, _decay(self.L_F * ds)
         passed = (np.eye(eps.size) - E) / gain

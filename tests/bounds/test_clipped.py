@@ -20,9 +20,10 @@ from ptcc_certify.errors import HypothesisError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.agents import Agents
-from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.asks import Asks, Expectations
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.simulation.late_messages import simulate_late
 from ptcc_certify.simulation.moving_leaders import simulate_tracking
 
 F = Fraction
@@ -121,6 +122,27 @@ def test_the_run_arrives_below_the_bound(U: int):
     assert np.abs(made.input).max() <= U and off[:, int(np.abs(made.t - 1).argmin())].max() < 1e-9
 
 
+def test_the_input_asked_for_is_that_of_clipped_inputs():
+    for most, code in ((8, 0), (7, 4)):
+        asks = Asks(expectations=Expectations(max_input=most))
+        assert certify(TEAM, PROTOCOL, BEGIN, messages=clipped(8), asks=asks).assessment.exit_code == code
+
+
+def test_fast_decays_are_stated_at_slower_rates():
+    """e^(b s) at the turn would be beyond floats."""
+    graph, protocol = [("L", "a", 100)], NominalProtocol(T=1, rho1=1, rho2=4, kappa=1)
+    made = certify(graph, protocol, [0, 3], messages=clipped("3.01"))
+    assert made.verdict == "certified" and made.late.largest == 0
+
+
+@pytest.mark.parametrize("other", [{"speed": 1}, {"disturbance": 1}, {"growth": 1}])
+def test_runs_are_refused_of_what_is_not_certified(other: dict[str, Any]):
+    with pytest.raises(ParameterError, match="beside"):
+        simulate_tracking(TEAM, PROTOCOL, MovingLeaders(saturation=5, **other), BEGIN)
+    with pytest.raises(ParameterError, match="neither late nor off"):
+        simulate_late(TEAM, PROTOCOL, LateMessages(value_error=1), BEGIN, leaders=MovingLeaders(saturation=5))
+
+
 # ---------------------------------------------------------------------- files
 
 
@@ -202,3 +224,10 @@ def test_what_is_not_proved_is_refused_in_one_line(graph: Any, parts: dict[str, 
     parts = {"leaders": MovingLeaders(saturation=5), **parts}
     with pytest.raises((ParameterError, HypothesisError), match=why):
         certify(graph, parts.pop("protocol", PROTOCOL), **parts)
+
+
+def test_what_is_told_of_a_file_is_what_was_told_at_first(tmp_path):
+    made = certify(TEAM, PROTOCOL, BEGIN, messages=clipped(2))
+    made.save(tmp_path / "c.json")
+    again = read_certificate(tmp_path / "c.json")
+    assert again.late.missing == made.late.missing and again.late.unreachable == made.late.unreachable

@@ -270,7 +270,7 @@ def test_agents_that_begin_on_their_targets_are_not_said_to_get_little_nearer(wo
         (("group.csv", "--delay", "0.1", "--delta", "1"), "a leads and hears others: add a gain cap"),
         (
             ("team.csv", "--leader-speed", "1", "--stop-before", "0.1"),
-            "under one gain cap alone; leave others out",
+            "one gain cap alone is certified; leave others out",
         ),
         (("team.csv", "--uncertainty", "1%", "--delay", "none"), 'no column "none"; add it, or name one of source'),
         (("group.csv", "--uncertainty", "1%", "--leader-speed", "1"), "a leads and hears others: leave it out"),
@@ -295,7 +295,7 @@ def test_agents_that_begin_on_their_targets_are_not_said_to_get_little_nearer(wo
             ("team.csv", "--leader-speed", "1", "--delay", "1", "--own-delay", "--gain-cap", "9"),
             "--own-delay: an own state that is late is certified of leaders at rest alone; leave one of the two out",
         ),
-        (("group.csv", "--leader-speed", "1", "--delay", "1"), "leaders that move as they like: a bound needs leaders"),
+        (("group.csv", "--leader-speed", "1", "--delay", "1"), "leaders that move: a bound needs leaders"),
         (("group.csv", "--leader-speed", "1", "--delay", "1", "--gain-cap", "9"), "a and b are leaders of one group"),
         (("team.csv", "--leader-speed", "1", "--delay", "1", "--stop-before", "0.1"), "--stop-before: late messages"),
         (

@@ -33,6 +33,8 @@ from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.limited_gain import LimitedGain
 from ptcc_certify.model.moving_leaders import MovingLeaders
 
+#: The largest exponent of what grows, in floats.
+LARGEST_EXPONENT = 600
 #: What is left is told to be at least this: less would take too many digits to write.
 LEAST_LEFT = Fraction(1, 2**1000)
 
@@ -233,6 +235,8 @@ class LateCase:
         NoCertificate
             It is too large.
         """
+        if growth * self.protocol.T > LARGEST_EXPONENT:
+            raise NoCertificate("agents part too fast by themselves")
         try:
             return self.exact.grown(growth)
         except RejectedError as error:
@@ -265,8 +269,16 @@ class LateCase:
         clock = self.clock(cap)
         return Fraction(0) if clock is None else left_above(b * clock)
 
-    def decay(self, b: Fraction, t: np.ndarray, cap: Fraction | None = None) -> np.ndarray:
-        """Bound ``e^(-b s)`` of the same integral at instants, (M,) floats from above."""
+    def decay(
+        self, b: Fraction, t: np.ndarray, cap: Fraction | None = None, growth: Fraction = Fraction(0)
+    ) -> np.ndarray:
+        """Bound ``e^(growth (t - T) - b s)`` of the same integral at instants, (M,) floats from above."""
+        if growth:
+            clock = np.asarray(self.limited(cap).clock(t))
+            grows, falls = float_up(growth) * (t - float(self.protocol.T)), float_down(b) * clock
+            size = grows - falls + 1e-12 * (np.abs(grows) + np.where(np.isinf(clock), 0, falls)) + 1e-12
+            with np.errstate(over="ignore"):
+                return np.where(np.isinf(clock), 0.0, np.exp(size) + 1e-300)
         return Decay(2 * float_down(b), 1.0).times(1.0, Instants(np.asarray(self.limited(cap).clock(t))))
 
     def highest(self, b: Fraction, cap: Fraction | None = None) -> Fraction:

@@ -35,8 +35,8 @@ from lmi.dyadic import round_to_bits
 from lmi.errors import LMIError, NoCertificate
 from lmi.exact.decimal_rounding import float_up
 from lmi.exact.elementary_enclosures import exp, log, rounded
-from ptcc_certify.bounds.delay.case import LateCase, Moments
-from ptcc_certify.checker.input_formulas import BITS, Limits, drift_above
+from ptcc_certify.bounds.delay.case import LARGEST_EXPONENT, LateCase, Moments
+from ptcc_certify.checker.input_formulas import BITS, Limits, PrescribedGain, drift_above
 from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
 from ptcc_certify.model.gain import Gain
 
@@ -48,8 +48,8 @@ _TRIED, _LARGEST_Q, _LOSSES = 10, 1e9, (0.01, 0.2, 0.6)
 LOSSES_CLIPPED = (0.01, 0.2, 0.4, 0.6, 0.75, 0.85, 0.92, 0.96, 0.98, 0.99, 0.995, 0.999)
 #: The share of the speed that inputs allow at which bounds fall, and halvings by which is found until when.
 _SLOWER, _HALVINGS = 1 - Fraction(1, 2**20), 100
-#: The largest exponent of what grows after ``T``, in floats.
-_LARGEST_EXPONENT = 700.0
+#: Slower rates that are tried where ``e^(b s)`` is beyond floats.
+_SLOWED = 20
 #: The share of the time that is left where bounds of followers of moving leaders are compared.
 _JUDGED = 0.05
 #: What is added to a bound in floats, relatively and absolutely, so that it holds.
@@ -89,9 +89,8 @@ class RowBound:
     level: Fraction | None = None
 
     def stays(self, case: LateCase) -> bool:
-        """Whether what is left at ``T`` is never exceeded: nothing is, or growth is slower than the decay then."""
-        left = self.initial * self.left or self.floor or self.after
-        return not left or case.exact.lasting(case.growth, self.witness.b) is not None
+        """Whether growth is slower than the decay after ``T``, so that what is left then is never exceeded."""
+        return case.exact.lasting(case.growth, self.witness.b) is not None
 
     def residual(self, after: bool = False) -> np.ndarray:
         """Return what bounds ``|x_k - x_k*|`` at ``T``, or from there on, for every follower, in floats from above."""
@@ -183,8 +182,7 @@ def driven(
         grown = -np.expm1(-rate * np.maximum(t - T, 0))
         later = before[-1] * (1 - grown) + push / rate * grown
         added = np.where(t > T, np.minimum(later, after if rate > 0 else np.inf), before[:-1])
-    y = case.decay(b, t, cap)
-    return np.where(y > 0, y * np.exp(np.minimum(part * (t - T), _LARGEST_EXPONENT)), 0.0), added
+    return case.decay(b, t, cap, growth), added
 
 
 def lasting(case: LateCase, b: Fraction, floor: np.ndarray, t: np.ndarray, growth: Fraction) -> np.ndarray:
@@ -320,36 +318,51 @@ def _best_q(case: LateCase, rows: FollowerRows) -> float:
     return best
 
 
-def _clipped(case: LateCase, witness: RowWitness, start: Fraction, most: Fraction) -> tuple[Fraction, ...]:
-    """Return ``turn``, ``level`` and ``initial`` of a witness where inputs are clipped, ``most = U/max u``.
+def _clipped(
+    case: LateCase, b: Fraction, start: Fraction, most: Fraction
+) -> tuple[Fraction, Fraction, Fraction, Fraction]:
+    """Return ``b``, ``turn``, ``level`` and ``initial`` where inputs are clipped, ``most = U/max u``.
+
+    A rate whose ``e^(b s)`` at the turn is beyond floats is given up for a slower one.
 
     Raises
     ------
     NoCertificate
         ``b rho2 kappa`` is below 1, or ``start`` is too large for the inputs.
     """
-    gain, b, cap, speed = case.protocol.gain.exact, witness.b, case.messages.gain_cap, most * _SLOWER
+    gain, cap, speed = case.protocol.gain.exact, case.messages.gain_cap, most * _SLOWER
+    for _ in range(_SLOWED):
+        if b * gain.k < 1 or start >= speed * gain.T:
+            raise NoCertificate("inputs that are clipped do not bring them there, as far as is proved")
+        turn = _turn(gain, b, start, (speed, most), cap)
+        level = start - speed * turn
+        passed = Fraction(0) if not turn else rounded(b * Limits(cap, gain.T - turn).clock_above(gain), BITS, up=True)
+        if passed <= LARGEST_EXPONENT:
+            return b, turn, level, rounded(level * exp(passed, BITS)[1], BITS, up=True)
+        b = min(b / 2, max(1 / gain.k, b * LARGEST_EXPONENT / passed)) if b > 2 / gain.k else 1 / gain.k
+    raise NoCertificate("inputs that are clipped bring them there too near to T")
+
+
+def _turn(
+    gain: PrescribedGain, b: Fraction, start: Fraction, speeds: tuple[Fraction, Fraction], cap: Fraction | None
+) -> Fraction:
+    """Return when ``b g`` times the line from ``start``, at the first speed, is between this and the second."""
+    speed, most = speeds
 
     def pulled(t: Fraction) -> Fraction:
         acts = gain.value(1 - t / gain.T)
         return b * min(acts, cap or acts) * (start - speed * t)
 
-    if b * gain.k < 1 or start >= speed * gain.T:
-        raise NoCertificate("inputs that are clipped do not bring them there, as far as is proved")
     if pulled(Fraction(0)) <= most:
-        return Fraction(0), start, start
+        return Fraction(0)
     low, high = Fraction(0), start / speed
     turn = rounded(high / 2, BITS)
     for _ in range(_HALVINGS):
         if speed <= pulled(turn) <= most:
-            break
+            return turn
         low, high = (turn, high) if pulled(turn) > most else (low, turn)
         turn = rounded((low + high) / 2, BITS)
-    else:
-        raise NoCertificate("when inputs are clipped no more lies too near to T")
-    level = start - speed * turn
-    passed = rounded(b * Limits(cap, gain.T - turn).clock_above(gain), BITS, up=True)
-    return turn, level, rounded(level * exp(passed, BITS)[1], BITS, up=True)
+    raise NoCertificate("when inputs are clipped no more lies too near to T")
 
 
 def row_bound(case: LateCase, rows: FollowerRows, first: np.ndarray, witness: RowWitness) -> RowBound:
@@ -370,10 +383,12 @@ def row_bound(case: LateCase, rows: FollowerRows, first: np.ndarray, witness: Ro
     more = case.exact.lasting(case.growth, witness.b) or grown
     initial = Fraction(float((first / witness.u).max()) * MORE) * grown
     stands = Fraction(floor * MORE) * more
-    row = RowBound(witness, cap, case.clock(cap), case.left(witness.b, cap), initial, stands)
+    clipped: dict[str, Fraction] = {}
     if (most := case.exact.saturation) is not None:
-        turn, level, reached = _clipped(case, witness, initial, most / Fraction(float(witness.u.max())))
-        row = replace(row, start=initial, turn=turn, level=level, initial=reached)
+        b, turn, level, reached = _clipped(case, witness.b, initial, most / Fraction(float(witness.u.max())))
+        clipped = {"start": initial, "turn": turn, "level": level}
+        witness, initial = replace(witness, b=b), reached
+    row = RowBound(witness, cap, case.clock(cap), case.left(witness.b, cap), initial, stands, **clipped)
     if case.leaders is None:
         return row
     push = case.push / Fraction(float(witness.u.min())) * grown

@@ -122,9 +122,8 @@ class FamilyForm:
         return Moments(float(self.b), y, decaying, standing)
 
     def stays(self, case: LateCase) -> bool:
-        """Whether what is left at ``T`` is never exceeded: nothing is, or growth is slower than the decay then."""
-        left = self.initial * self.left or self.floor or self.push
-        return not left or case.exact.lasting(self.growth or Fraction(0), self.b) is not None
+        """Whether growth is slower than the decay after ``T``, so that what is left then is never exceeded."""
+        return case.exact.lasting(self.growth or Fraction(0), self.b) is not None
 
     def after(self, case: LateCase) -> float:
         """Return what disturbances add to the root at all times."""

@@ -20,7 +20,7 @@ import numpy as np
 
 from lmi.errors import LMIError
 from lmi.exact.decimal_rounding import float_up, up
-from ptcc_certify.bounds.delay.case import LateCase, asked_leaders, read_leaders
+from ptcc_certify.bounds.delay.case import LARGEST_EXPONENT, LateCase, asked_leaders, read_leaders
 from ptcc_certify.bounds.delay.certain_misses import Missed, find_missed
 from ptcc_certify.bounds.delay.decay_by_rows import LOSSES_CLIPPED, MORE, RowBound, away, search_rows
 from ptcc_certify.bounds.delay.decay_by_steps import Steps, bound_steps, search_steps
@@ -151,6 +151,8 @@ class LateBounds:
         """What was not found, in words, where nothing is proved."""
         if self.case.exact.saturation is not None:
             return self._not_reached
+        if self.case.growth * self.case.protocol.T > LARGEST_EXPONENT:
+            return f"growth times T is above {LARGEST_EXPONENT}"
         of_groups = isinstance(self.structure, Family) and self.case.led_by_groups
         if of_groups and self.relative:
             return "it asks for an initial state"

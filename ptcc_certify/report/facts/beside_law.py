@@ -33,6 +33,7 @@ def beside_law(certificate: Certificate) -> list[str]:
         rest = "leaders are at rest; of those that move was asked:"
         driven = "; followers then move by x_k' = u_k + d_k" if leaders.disturbance > 0 else ""
         what = rest if leaders.speed else "nothing disturbs; asked was:"
+        what = "nothing is clipped; asked was:" if leaders.clipped else "f = 0; asked was:" if leaders.growth else what
         text = leaders_text(leaders).removeprefix("at rest; ")
         if certificate.proof.late is not None and certificate.proof.late.forms:  # of agents that all follow each other
             text, driven = (words.replace("followers", "agents") for words in (text, driven))

@@ -9,7 +9,6 @@ from fractions import Fraction
 from lmi.exact.decimal_rounding import near, up
 from ptcc_certify.bounds.final_state.captured import Captured, Number, Reach
 from ptcc_certify.certificate.fact import Fact, Facts, Standing
-from ptcc_certify.errors import labelled
 from ptcc_certify.report.text_layout import agent_text, shorten_list
 
 #: Columns of a list on a short screen and of the names of one entry of it, and agents of a ranking there.
@@ -30,7 +29,7 @@ def captured_facts(found: Captured) -> Facts:
     constant: moves x(T) of c by up to 0.75, of a by 0
     varying: moves nobody farther
     """
-    names, standing = [labelled(agent_text(agent)) for agent in found.agents], _standing(found.exact)
+    names, standing = [agent_text(agent) for agent in found.agents], _standing(found.exact)
     ending = f"{' hear nobody, show' if names[1:] else ' hears nobody, shows'} {_span(found.radius, found.exact)}"
     brief = (shorten_list(names, _NAMES) + ending,)
     yield Fact(head="captured", value=found.agents, note=", ".join(names) + ending, brief=brief)
@@ -56,7 +55,7 @@ def ranking_facts(ranked: Sequence[Reach], radius: Fraction, exact: bool, detail
     """
     yield Fact(head="captured", note=f"each alone hears nobody, shows {_span(radius, exact)}")
     for reach in ranked if details else ranked[:_RANKED]:
-        name, most = (labelled(agent_text(label)) for label in (reach.agent, reach.moved_most))
+        name, most = (agent_text(label) for label in (reach.agent, reach.moved_most))
         moves = f"{name}: {_up(reach.total)} in all, {most} most, by {_up(reach.largest)}"
         text = f"{moves}; varying at most {_up(reach.varying)}" if reach.varying else f"{name}: nobody"
         yield Fact(head="moves", value=reach.total, side="up", standing=_standing(exact), note=text)
@@ -79,7 +78,7 @@ def _up(x: Number) -> str:
 def _moves(head: str, what: str, moves: Mapping[str, Number], standing: Standing) -> Fact:
     alike: dict[str, list[str]] = defaultdict(list)
     for label, x in sorted(moves.items(), key=lambda item: -item[1]):
-        alike[_up(x)].append(labelled(agent_text(label)))
+        alike[_up(x)].append(agent_text(label))
     long, short = list[str](), list[str]()
     for size, names in alike.items():
         by = f"by {'' if long or size == '0' else 'up to '}{size}"

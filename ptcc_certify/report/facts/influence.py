@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ptcc_certify.certificate.fact import Fact, Facts
-from ptcc_certify.errors import labelled
 from ptcc_certify.report.text_layout import agent_text, columns, shorten_list
 
 if TYPE_CHECKING:
@@ -40,13 +39,13 @@ def influence_facts(who: Influence) -> Facts:
         yield Fact(head="decides", note="nobody: every node ends at 0, wherever it begins")
         return
     order = [int(j) for j in np.argsort(-shares, kind="stable") if shares[j]]
-    texts = [f"{labelled(agent_text(labels[j]))} {100 * shares[j]:.3g} %" for j in order]
+    texts = [f"{agent_text(labels[j])} {100 * shares[j]:.3g} %" for j in order]
     yield Fact(head="decides", value={labels[j]: float(shares[j]) for j in order}, note=shorten_list(texts, _SHORT))
     if len(labels) > _ROWS:
         return
     groups: dict[tuple[tuple[int, Any], ...], list[str]] = defaultdict(list)
     for k, label in enumerate(labels):
-        groups[tuple(who.row(k).items())].append(labelled(agent_text(label)))
+        groups[tuple(who.row(k).items())].append(agent_text(label))
     told: list[str] = []
     brief: list[str] = []
     for row, names in groups.items():

@@ -114,7 +114,11 @@ def _tracking(late: LateBounds, leaders: MovingLeaders, at: Fraction | None) -> 
     if not leaders.idle:
         yield Fact(head=head, note=leaders_text(leaders)) if alone else _pushed(late, leaders)
     if not late.says_something:
-        yield Fact(head=head, standing="unproved", note=f"nothing is proved: {late.missing}", loud=True)
+        why = f"nothing is proved: {late.missing}"
+        if late.unreachable is not None:
+            name, off = late.unreachable
+            why = f"agent {labelled(name)} is off by {down(off, 3)} at T at least; {late.missing}"
+        yield Fact(head=head, standing="unproved", note=why, loud=True)
         return
     protocol, after = late.case.protocol, late.after
     if (cap := late.messages.gain_cap) is not None:
@@ -148,7 +152,8 @@ def _pushed(late: LateBounds, leaders: MovingLeaders) -> Fact:
     text = leaders_text(leaders)
     if late.forms:
         text = text.removeprefix("at rest; ").replace("of followers", "of all who listen")
-    head = "agents" if leaders.growth else "disturbed" if late.forms else "leaders"
+    heads = {"agents": leaders.growth, "disturbed": late.forms, "limited": leaders.clipped, "leaders": True}
+    head = next(name for name, fits in heads.items() if fits)
     return Fact(head=head, note=text)
 
 
@@ -260,7 +265,7 @@ def _within_text(late: LateBounds, digits: int) -> str:
         return f"every {'agent exactly at its final state' if late.leaders is None else 'follower on its target'} at T"
     text = f"every agent within {up(late.largest, digits)} of {late.goal} at T"
     if late.leaders is not None and not late.forms:
-        text = f"every follower within {up(late.largest, digits)} of its target at T"
+        text = f"every follower within {up(late.largest, digits)} of {late.goal} at T"
         text += "" if late.after is None else f", within {up(late.after, digits)} from then on"
     text += FROM_WITHIN_1 if late.relative else ""
     return text + ("; leaders hear each other at once, and settle by themselves" if late.settling is not None else "")

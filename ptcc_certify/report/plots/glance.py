@@ -179,8 +179,9 @@ def _run_of(certificate: Certificate, runs: Sequence[Any] | None) -> Any:
 
 
 def _of_bounds(certificate: Certificate) -> bool:
-    """Tell whether runs under many signals are drawn, or bounds alone."""
-    return certificate.of_family or certificate.proof.late is not None
+    """Tell whether runs under many signals are drawn, or bounds alone, if there are some."""
+    late = certificate.proof.late
+    return certificate.of_family if late is None else not certificate.of_family or late.says_something
 
 
 class _Head(NamedTuple):
