@@ -179,7 +179,7 @@ def test_the_run_of_leaders_that_move_by_themselves_is_on_the_bound(speed: Fract
 
 @pytest.mark.parametrize(("graph", "growth"), [([("L", "a", "1.01")], 1), ([("a", "b", 1), ("b", "a", 1)], 20)])
 def test_long_after_t_a_bound_is_above_what_grows(graph: Any, growth: int):
-    """Under a cap the distance of two agents is e^(growth t - b s) of what it was, whatever is beyond floats of these."""
+    """Under a cap the distance of two agents is e^(growth t - b s) of what it was, also beyond floats."""
     leaders = MovingLeaders(growth=growth)
     late = certify(graph, PROTOCOL, [0, 1], messages=LateMessages(gain_cap=5, leaders=leaders)).late
     t, b = np.array([1, 40, 400, 720.0]), 1.01 if growth == 1 else 2

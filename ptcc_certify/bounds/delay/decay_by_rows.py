@@ -118,7 +118,7 @@ class RowBound:
         if self.turn and self.start is not None and self.level is not None:
             line = float(self.start) - float(self.start - self.level) * t / float(self.turn)
             falls = np.where(t < float(self.turn), np.minimum(falls, line * MORE), falls)
-        return Moments(float(self.witness.b), y, u * falls, floor)
+        return Moments(float(self.witness.b), y, each_times(u, falls), floor)
 
     def highest_floor(self, case: LateCase) -> Fraction:
         """Return what errors of values, leaders that move and disturbances add at most up to ``T``."""
@@ -183,6 +183,12 @@ def driven(
         later = before[-1] * (1 - grown) + push / rate * grown
         added = np.where(t > T, np.minimum(later, after if rate > 0 else np.inf), before[:-1])
     return case.decay(b, t, cap, growth), added
+
+
+def each_times(sizes: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return (N, 1) times (M,): 0 where the first is 0, also of what is infinite."""
+    with np.errstate(invalid="ignore"):
+        return np.where(sizes > 0, sizes * y, 0.0)
 
 
 def lasting(case: LateCase, b: Fraction, floor: np.ndarray, t: np.ndarray, growth: Fraction) -> np.ndarray:

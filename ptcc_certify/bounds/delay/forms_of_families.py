@@ -32,7 +32,7 @@ from lmi.errors import NoCertificate
 from lmi.exact.decimal_rounding import float_up
 from lmi.exact.elementary_enclosures import exp, rounded
 from ptcc_certify.bounds.delay.case import LateCase, Moments
-from ptcc_certify.bounds.delay.decay_by_rows import driven, lasting
+from ptcc_certify.bounds.delay.decay_by_rows import driven, each_times, lasting
 from ptcc_certify.checker.forms_of_families import Edge, SpreadingFunction, heard_in_mode
 from ptcc_certify.checker.input_formulas import BITS, drift_above, root_above
 from ptcc_certify.checker.signal_bounds import least
@@ -116,7 +116,9 @@ class FamilyForm:
             for values in (decay.away, None if self.sizes is None else [self.sizes[v] for v in self.nodes])
         )
         standing = lasting(case, self.b, sizes * float_up(self.floor or Fraction(0)), t, growth)
-        decaying, standing = (case.of_nodes(self.nodes, x) for x in (first * y + sizes * added, standing))
+        decaying, standing = (
+            case.of_nodes(self.nodes, x) for x in (each_times(first, y) + each_times(sizes, added), standing)
+        )
         alone = np.setdiff1d(np.arange(len(decaying)), np.concatenate([sources, listeners]))
         decaying[alone] = standing[alone] = 0
         return Moments(float(self.b), y, decaying, standing)
