@@ -53,7 +53,7 @@ def edit(
     if not (without_nodes or without_edges):
         raise ParameterError("nothing is left out; give --without-node NODE or --without-edge SOURCE,TARGET")
     if output is not None and Path(output).suffix.lower() not in (".csv", ".txt"):
-        raise ParameterError(f"{output}: rows source,target,weight are written to .csv or .txt; choose one of these")
+        raise ParameterError(f"{output}: graphs are written as edge lists; let the name end in .csv or .txt")
     refuse_output(output)
     whole = read(graph, options)
     nodes = [text if text in whole.labels else text.removeprefix('"').removesuffix('"') for text in without_nodes]
