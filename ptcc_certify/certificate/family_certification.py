@@ -31,7 +31,7 @@ from ptcc_certify.checker.reading import Interval
 from ptcc_certify.checker.row_functions import MANY_FUNCTIONS
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.graphs.rationals import nearest_float
+from ptcc_certify.graphs.rationals import nearest_float, writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
 from ptcc_certify.lyapunov.common_form_search import CLOSED_ROWS, FULL_ROWS, CommonFormSearch, search_common_forms
@@ -251,5 +251,10 @@ def _prove(
             again = prove_signal_rate_bound(quotient, search.functions)
             bound = bound if again is None else min(bound, again, key=lambda b: b.value)
     better = [V for V in squares if _ENOUGH * V.rate > rate]
-    functions = sorted((*search.functions, *aimed), key=lambda V: -V.rate)
+    functions = sorted(filter(_written, (*search.functions, *aimed)), key=lambda V: -V.rate)
     return ComponentProof(component, (*better, *functions), bound)
+
+
+def _written(V: ProvedFunction) -> bool:
+    """Tell whether the entries of a form are short enough for a file, as those of long weights need not be."""
+    return not isinstance(V, CommonForm) or all(writable(x) for row in V.matrix for x in row)
