@@ -1425,3 +1425,17 @@ def test_what_figures_are_not_made_for_is_refused() -> None:
     for words, told in (({"purpose": "poster"}, "one of ieee, nature, slide"), ({"width": 0}, "0.5 to 100 inches")):
         with pytest.raises(ParameterError, match=told), figures_for(**words):  # type: ignore[arg-type]
             pass
+
+
+def test_delays_of_edges_stand_at_their_arrows_and_inputs_have_the_colours_of_where_agents_end():
+    graph = ptcc_certify.SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1), ("c", "b", -1)])
+    lags = {("a", "b"): "0.02", ("b", "c"): "0.01", ("c", "b"): "0.03"}
+    asks = ptcc_certify.Asks(simulation=False)
+    p = ptcc_certify.NominalProtocol(T=1, rho1=1, rho2=4, kappa=1)
+    cert = ptcc_certify.certify(graph, p, [1, 2, 3], messages=ptcc_certify.LateMessages(lags), asks=asks)
+    written = [text.get_text() for text in ptcc_certify.plot_graph(cert).texts]
+    assert written[3:] == ["0.02 late", "0.01 / 0.03 late"]
+    assert [text.get_text() for text in ptcc_certify.plot_graph(graph).texts] == ["a", "b", "c"]
+    plain = ptcc_certify.certify(graph, p, [1, 2, 3], asks=asks)
+    colours = {line.get_color() for line in ptcc_certify.plot_input(plain).lines[:3]}
+    assert colours == {line.get_color() for line in ptcc_certify.plot_trajectory(plain).lines[:3]}

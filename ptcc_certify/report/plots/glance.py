@@ -31,7 +31,7 @@ from ptcc_certify.report.plots.camp_lines import (
 from ptcc_certify.report.plots.decay import NothingDecays
 from ptcc_certify.report.plots.distributions import plot_final_states
 from ptcc_certify.report.plots.final_colours import at_deadline, colours_at_end, final_states, positions_of
-from ptcc_certify.report.plots.graph import node_id, plot_graph
+from ptcc_certify.report.plots.graph import delays_of, node_id, plot_graph
 from ptcc_certify.report.plots.graph_labels import INSIDE
 from ptcc_certify.report.plots.motion import agents_run, plot_formation
 from ptcc_certify.report.plots.sizes import DOUBLE_COLUMN, SINGLE_COLUMN, current_sizes
@@ -314,7 +314,7 @@ def _draw_graph(panel: SubFigure, certificate: Certificate, ends: np.ndarray, co
     if ends.size <= LABELLED_NODES:
         beside = max(map(columns, certificate.labels)) > INSIDE  # labels reach beyond the nodes
         ax = panel.add_axes((0.11, 0.16, 0.78, 0.82) if beside else (0.02, 0.16, 0.96, 0.82))
-        plot_graph(subject, ax=ax, colours=colours)
+        plot_graph(subject, ax=ax, colours=colours, delays=delays_of(certificate))
         if (legend := ax.get_legend()) is not None:
             texts = [text.get_text() for text in legend.get_texts()]
             handles: Any = legend.legend_handles

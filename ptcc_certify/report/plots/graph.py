@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import Any, NamedTuple
 
@@ -57,10 +57,13 @@ class WeightRange(NamedTuple):
         Its size is the largest.
     least : float
         0 of an edge that may fail.
+    late : str
+        How late is what is heard over it, in words; empty where that is not told edge by edge.
     """
 
     arrow: Arrow
     least: float
+    late: str = ""
 
     @property
     def text(self) -> str:
@@ -70,7 +73,13 @@ class WeightRange(NamedTuple):
 
 
 @styled
-def plot_graph(subject: Any, *, ax: Axes | None = None, colours: Sequence[Any] | None = None) -> Axes:
+def plot_graph(
+    subject: Any,
+    *,
+    ax: Axes | None = None,
+    colours: Sequence[Any] | None = None,
+    delays: Mapping[tuple[str, str], Any] | None = None,
+) -> Axes:
     """Draw the signed digraph ``(V, E, W)``: an arrow from ``j`` to ``k`` where ``w_kj != 0``, so that ``k`` listens.
 
     Solid arrows come from allies (``w_kj > 0``), dashed ones from opponents; two opposite ones of the same weight are
@@ -96,6 +105,9 @@ def plot_graph(subject: Any, *, ax: Axes | None = None, colours: Sequence[Any] |
     colours : sequence of N colours, optional
         Of the nodes, in place of those of their camps: the second camp is then drawn as squares, unbalanced leaders as
         diamonds, and the legend tells these alone.
+    delays : mapping of (source, target) to number, optional
+        How late is what is heard over each edge of one graph, in units of time: written at its arrow. By default those
+        of a certificate whose messages have delays of their own.
 
     Returns
     -------
@@ -121,11 +133,13 @@ def plot_graph(subject: Any, *, ax: Axes | None = None, colours: Sequence[Any] |
     if isinstance(subject, Certificate) and colours is None:
         colours = _colours_of(subject)
         told = "" if colours is None else "colour: state at $T$"
+    if isinstance(subject, Certificate) and delays is None:
+        delays = delays_of(subject)
     room = np.array(ax.get_window_extent().size) / ax.figure.dpi * 72 * [1.05, 0.95]  # points, of own axes
     component_of = np.full(graph.n_nodes, -1)
     for number, component in enumerate(structure.closed_components):
         component_of[list(component.nodes)] = number
-    edges = weight_ranges(Family.from_graph(graph).modes[0])
+    edges = weight_ranges(Family.from_graph(graph).modes[0], delays, graph.labels)
     layout, bends = _layout(graph.labels, [edge.arrow for edge in edges], component_of, room)
     groups = [c.nodes for c in structure.closed_components if len(c.nodes) > 1 and structure.followers.size]
     for nodes in groups:
@@ -235,14 +249,15 @@ def _draw_mode(
         _draw_coloured(ax, place, radius, groups, structure.leaders, colours)
     among = among or edges
     differ, largest = len({edge.text for edge in among}) > 1, max((edge.arrow.size for edge in among), default=1.0)
+    texts = [", ".join(filter(None, (edge.text * differ, edge.late))) for edge in edges]
     _draw_arrows(ax, edges, place, bends, radius, largest if differ else None)
-    arrows = [arrow for arrow, _ in edges]
+    arrows = [edge.arrow for edge in edges]
     lines = boxes_along(arrows, place, bends)
     written = draw_labels(
         ax, layout.labels, place, radius, None if layout.inside else [b for line in lines for b in line]
     )
-    if differ:
-        draw_sizes(ax, arrows, [edge.text for edge in edges], place, bends, written, lines)
+    if any(texts):
+        draw_sizes(ax, arrows, texts, place, bends, written, lines)
     ax.set_aspect("equal")
     ax.set_xlim(-layout.size[0] / 2, layout.size[0] / 2)
     ax.set_ylim(-layout.size[1] / 2, layout.size[1] / 2)
@@ -250,7 +265,15 @@ def _draw_mode(
     return np.concatenate([written, *lines])
 
 
-def weight_ranges(mode: Mode) -> list[WeightRange]:
+def delays_of(certificate: Certificate) -> Mapping[tuple[str, str], Any] | None:
+    """Return how late messages are edge by edge; None where all are as late."""
+    messages = certificate.proof.asked_messages
+    return messages.delay if messages is not None and isinstance(messages.delay, Mapping) else None
+
+
+def weight_ranges(
+    mode: Mode, delays: Mapping[tuple[str, str], Any] | None = None, labels: Sequence[str] = ()
+) -> list[WeightRange]:
     """Return the edges of a mode; two opposite ones of the same range are one with two heads."""
     lower, upper = mode.lower.as_float().tolist(), mode.upper.as_float().tolist()
     keys = list(zip(mode.source.tolist(), mode.target.tolist(), mode.sign.tolist(), strict=True))
@@ -259,19 +282,23 @@ def weight_ranges(mode: Mode) -> list[WeightRange]:
     for (a, b, sign), (least, most) in ranges.items():
         mutual = ranges.get((b, a, sign)) == (least, most)
         if not (mutual and b < a):
-            result.append(WeightRange(Arrow(a, b, sign, most, mutual), least))
+            late = [] if delays is None else [delays.get((labels[a], labels[b]))]
+            late += [delays.get((labels[b], labels[a]))] if mutual and delays is not None else []
+            sizes = dict.fromkeys(f"{float(x):.3g}" for x in late if x)
+            told = f"{' / '.join(sizes)} late" if sizes else ""
+            result.append(WeightRange(Arrow(a, b, sign, most, mutual), least, told))
     return result
 
 
 def _bends(edges: Sequence[WeightRange]) -> np.ndarray:
     """Bend arrows that share their ends apart."""
     count: dict[frozenset[int], int] = {}
-    for arrow, _ in edges:
+    for arrow in (edge.arrow for edge in edges):
         pair = frozenset((arrow.source, arrow.target))
         count[pair] = count.get(pair, 0) + 1
     seen: dict[tuple[int, int], int] = {}
     bends = []
-    for arrow, _ in edges:
+    for arrow in (edge.arrow for edge in edges):
         ends = arrow.source, arrow.target
         alone = count[frozenset(ends)] == 1
         seen[ends] = seen.get(ends, -1) + 1
@@ -319,7 +346,7 @@ def _draw_arrows(
 ) -> None:
     """Draw arrows as wide as the least sizes on bands as wide as the largest; all are alike without a largest one."""
     style: dict[str, Any] = {"shrinkA": radius + 1, "shrinkB": radius + 1}
-    for (arrow, least), bend in zip(edges, bends, strict=True):
+    for (arrow, least, _), bend in zip(edges, bends, strict=True):
         colour, line, _ = EDGE_STYLES[arrow.sign]
         start, end = place[arrow.source], place[arrow.target]
         curve = f"arc3,rad={bend}"
@@ -332,13 +359,13 @@ def _draw_arrows(
         drawn |= {"arrowstyle": "<|-|>" if arrow.mutual else "-|>", "linestyle": line if least else ":"}
         ax.add_artist(FancyArrowPatch(start, end, connectionstyle=curve, **drawn, **style))
     for sign, (colour, line, name) in EDGE_STYLES.items():
-        if any(arrow.sign == sign for arrow, _ in edges):
+        if any(edge.arrow.sign == sign for edge in edges):
             ax.plot([], [], color=colour, linestyle=line, linewidth=1.1, label=name)
     uncertain = {edge.text for edge in edges if edge.least < edge.arrow.size}
     if uncertain:
         alone = f": {uncertain.pop()}" if len({edge.text for edge in edges}) == 1 else ""
         ax.plot([], [], color="black", alpha=0.3, linewidth=4, label=f"uncertain weight{alone}")
-    if any(not least for _, least in edges):
+    if any(not edge.least for edge in edges):
         ax.plot([], [], color="black", linestyle=":", linewidth=1.1, label="may fail")
 
 

@@ -17,6 +17,7 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.report.facts.input import initial_states_text
 from ptcc_certify.report.plots.camp_lines import NAME_SIZE, draw_agents, draw_deadlines, name_agents
+from ptcc_certify.report.plots.final_colours import colours_at_end
 from ptcc_certify.report.plots.motion import agents_run
 from ptcc_certify.report.plots.runs_under_signals import (
     bound_label,
@@ -72,7 +73,9 @@ def plot_input(
     time_unit: str = "",
     beside: Sequence[Any] = (),
 ) -> Axes:
-    """Draw ``u_k(t)`` of one run in the colours and lines of the camps, and the peak of ``|u_k|`` that is proved.
+    """Draw ``u_k(t)`` of one run, and the peak of ``|u_k|`` that is proved.
+
+    Lines are those of the camps, colours those of where agents end.
 
     Lines and names are those of :func:`plot_trajectory`. The axis is linear; for an input that grows to three times its
     initial size, or is large for a short time alone, it is logarithmic on both sides of a linear part about 0. Behind
@@ -130,7 +133,10 @@ def plot_input(
     drawn = _inputs_of(subject, certificate)
     run = drawn.run
     structure = analyse(run.graph) if isinstance(run, AgentsTrajectory) else structure_of(subject)
-    named = draw_agents(ax, run, drawn.values, structure, size=drawn.sizes, drawstyle=drawn.steps)
+    of = subject if isinstance(subject, Certificate) else certificate
+    colours = None if of is None else colours_at_end(of, run)
+    colours = None if len(set(colours or ())) < 2 else colours  # where all end alike camps tell them apart
+    named = draw_agents(ax, run, drawn.values, structure, size=drawn.sizes, drawstyle=drawn.steps, colours=colours)
     every = [drawn.axis, *(_inputs_of(other, None).axis for other in beside)]
     least = min((one.least for one in every if one.least), default=0.0)
     axis = InputAxis(least, min(one.low for one in every), max(one.high for one in every))
