@@ -75,7 +75,7 @@ class DesignAnswer(Shown):
     certificate : Certificate or None
         What proves it; None unless the verdict is ``met``.
     peak : Fraction or None
-        The certified peak of the input at ``deadline``, also if it is too large.
+        The proved peak of the input at ``deadline``, also if it is too large.
     residual : Fraction or None
         How far an agent is from its final state, or from its place, at the deadline, at most; 0 without a cap.
     shortest_possible : Fraction or None
@@ -274,7 +274,7 @@ class Design(DesignAnswer):
         return replace(first, size=first.size * float(self.gain_cap / self.certificate.protocol.gain.first))
 
     def trade_off(self, deadlines: Iterable[float]) -> TradeOff:
-        """Return the certified peak at other deadlines, ``phi/T``, and what no gains can undercut; NaN if unknown.
+        """Return the proved peak at other deadlines, ``phi/T``, and what no gains can undercut; NaN if unknown.
 
         Peaks are rounded up, what no gains can undercut is rounded down.
 

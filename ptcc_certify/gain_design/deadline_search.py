@@ -259,7 +259,7 @@ def _without(answer: AgentsDesign, search: Search, nearest: Candidate | None) ->
         return replace(answer, verdict=INFEASIBLE, binding=answer.excluded)
     if nearest is None or nearest.peak is None:
         return replace(answer, binding="no matrix for these agents was proved")
-    text = f"at T = {short_exact(nearest.deadline)} the certified peak is {up(nearest.peak)}"
+    text = f"at T = {short_exact(nearest.deadline)} the proved peak is {up(nearest.peak)}"
     text += f", {up(nearest.peak / asked.max_input)} times the limit"
     if nearest.residual:
         text += f", and {up(nearest.residual)} is left of a position"

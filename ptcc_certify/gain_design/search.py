@@ -259,7 +259,7 @@ def _answer_without_gains(answer: Design) -> Design:
         return answer
     if answer.peak <= U:
         return replace(answer, binding="the residual is not proved")
-    over = f"the certified peak is {up(answer.peak)}, {up(answer.peak / U)} times the limit"
+    over = f"the proved peak is {up(answer.peak)}, {up(answer.peak / U)} times the limit"
     return replace(answer, binding=f"{over}; from T = {up(answer.product / U)} on it is met")
 
 

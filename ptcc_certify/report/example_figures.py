@@ -1,7 +1,7 @@
 """The figures of Section 4 of the paper, from certificates of its examples on the packaged graphs.
 
 Figures 1, 3 and 5 are the graphs, 2, 4, 6, 8, 10 and 12 the states, 7, 9 and 11 the sliding variables; panel (a) and
-(b) side by side. To these come the decay under its proved bound and the input under its certified peak.
+(b) side by side. To these come the decay under its proved bound and the input under its proved peak.
 """
 
 from __future__ import annotations

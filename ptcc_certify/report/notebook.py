@@ -104,7 +104,7 @@ def trajectory_html(trajectory: Trajectory) -> str:
 @html_of.register(Design)
 def design_html(answer: Design) -> str:
     """Show a design: the screen of ``ptcc design``, and its peak input against the deadline."""
-    alt = "certified peak input against the deadline, and what no gains can stay below"
+    alt = "proved peak input against the deadline, and what no gains can stay below"
     return _page(design_facts(answer), plot_trade_off(answer).figure, alt)
 
 

@@ -104,7 +104,7 @@ def test_inputs_are_below_their_curve(sigma0):
         assert (np.abs(run.input[:, own]) <= bound * (1 + 1e-6) + 1e-6).all()
     first = certificate.input_bound([1.0])[:, 0]
     assert (first <= [float(x) * (1 + 1e-9) for x in certificate.input_peaks]).all()
-    assert "certified peak" in plot_input(certificate, runs=played).texts[0].get_text()
+    assert "proved peak" in plot_input(certificate, runs=played).texts[0].get_text()
 
 
 def test_where_the_sliding_part_may_grow_there_is_no_curve_of_the_input():

@@ -187,6 +187,6 @@ def test_a_certificate_draws_its_figures_by_name(drawn):
 
 def test_the_certified_peak_has_the_digits_of_the_screen(drawn):
     certificate, runs = drawn
-    peak = plot_input(certificate, runs=runs).texts[0].get_text().removeprefix("certified peak ")
+    peak = plot_input(certificate, runs=runs).texts[0].get_text().removeprefix("proved peak ")
     assert f"|u_k| <= {peak}, " in "\n".join(certificate_lines(certificate, "day"))
     assert len(peak.replace(".", "").lstrip("0")) == 4

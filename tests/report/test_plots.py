@@ -165,8 +165,8 @@ def agent_lines(ax: Axes) -> list[Line2D]:
 
 
 def peak_of(ax: Axes) -> Annotation | None:
-    """The text at the line of the certified peak."""
-    return next((text for text in ax.texts if text.get_text().startswith("certified peak")), None)  # type: ignore[return-value]
+    """The text at the line of the proved peak."""
+    return next((text for text in ax.texts if text.get_text().startswith("proved peak")), None)  # type: ignore[return-value]
 
 
 @pytest.mark.few(0)
@@ -353,9 +353,9 @@ def test_with_late_messages_their_bound_of_the_input_is_drawn_and_not_that_of_me
     texts = [text.get_text() for text in drawn(plot_input(cert)).texts]
     (told,) = [text for text in texts if text.startswith("late messages: at most ")]
     assert float(told.split()[4].rstrip(",")) >= cert.late.input.max()
-    assert not any("certified peak" in text for text in texts)
+    assert not any("proved peak" in text for text in texts)
     punctual = [text.get_text() for text in drawn(plot_input(cert.trajectory, certificate=cert)).texts]
-    assert any("certified peak" in text and "messages at once" in text for text in punctual)
+    assert any("proved peak" in text and "messages at once" in text for text in punctual)
 
 
 @pytest.mark.parametrize(

@@ -121,7 +121,7 @@ def plot_input(
     >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
     >>> ax = plot_input(cert)
     >>> ax.get_ylabel(), ax.texts[0].get_text()
-    ('input $u_k$', 'certified peak 16.01')
+    ('input $u_k$', 'proved peak 16.01')
     """
     ax, x = axes_of(ax), time_label("time $t$", time_unit)
     if certifies_family(subject):
@@ -200,7 +200,7 @@ def _draw_signals(ax: Axes, certificate: Certificate, runs: Sequence[Trajectory]
     if bounded := bool(np.isfinite(bound).all()):
         ax.plot(t, bound, color=BOUND, linewidth=1.8, label=bound_label(certificate))
         sizes.append(np.interp(first.t, t, bound, right=0.0))
-    peaks = [Peak(float(peak), f"certified peak {up(peak, 4)}") for peak in sorted(proof.input_peaks or ())[-1:]]
+    peaks = [Peak(float(peak), f"proved peak {up(peak, 4)}") for peak in sorted(proof.input_peaks or ())[-1:]]
     _draw_peaks(ax, first.t, np.array(sizes), peaks, _axis_of(first.t, np.array(sizes), peaks, signed=False))
     ax.set_xlim(0, float(first.t[-1]))
     return bounded
@@ -268,7 +268,7 @@ def _agents_peaks(certificate: Certificate, sliding: bool) -> list[Peak]:
     if part is None or part.input is None:
         return []
     largest = max(part.input)
-    return [Peak(float(largest), f"certified peak {up(largest, 4)}{', sliding terms included' if sliding else ''}")]
+    return [Peak(float(largest), f"proved peak {up(largest, 4)}{', sliding terms included' if sliding else ''}")]
 
 
 def _every_period_sampled(run: Trajectory) -> bool:
@@ -283,7 +283,7 @@ def _peaks(run: Trajectory, certificate: Certificate) -> list[Peak]:
     """Return what bounds the input of a run, be it with late messages; not those of another run than it."""
     late = certificate.proof.late
     peak = None if run.vehicles else _certified_peak(run, certificate)  # which is of the virtual positions then
-    found = [] if peak is None else [Peak(peak, f"certified peak {up(peak, 4)}{_set_text(run, certificate)}")]
+    found = [] if peak is None else [Peak(peak, f"proved peak {up(peak, 4)}{_set_text(run, certificate)}")]
     met = run.conditions
     acts = met.messages is not None or met.leaders is not None or met.actuator is not None or run.vehicles
     if late is not None and acts and (largest := largest_late_input(late, certificate.protocol)) is not None:
