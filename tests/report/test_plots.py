@@ -1162,9 +1162,9 @@ def test_the_energy_grows_and_stays_under_its_bound(name: str) -> None:
     spent = shown["simulated (CVODES)"].get_ydata()  # type: ignore[attr-defined]
     assert spent[0] == 0 and (np.diff(spent) >= 0).all()
     assert cert.effort is not None
-    assert ("certified bound" in shown) == (cert.effort.energy is not None)
+    assert ("proved bound" in shown) == (cert.effort.energy is not None)
     if cert.effort.energy is not None:
-        bound = shown["certified bound"].get_ydata()[0]  # type: ignore[attr-defined]
+        bound = shown["proved bound"].get_ydata()[0]  # type: ignore[attr-defined]
         assert bound == float(cert.effort.energy.value)
         assert spent[-1] <= bound
     columns = simulate(cert.graph, cert.protocol, np.ones((cert.graph.n_nodes, 2)), times=[0])
@@ -1208,7 +1208,7 @@ def test_no_certified_line_for_a_run_from_elsewhere() -> None:
     late = simulate(pair, PROTOCOL, [300, -500], times=[0.01, 0.1, 0.5, 0.9, 1])
     for draw in (plot_input(late, certificate=cert), plot_effort(simulate(pair, PROTOCOL, [3, 5]), certificate=cert)):
         labels = set(labelled(draw))
-        assert ("certified bound" in labels) == draw.get_ylabel().startswith("energy")
+        assert ("proved bound" in labels) == draw.get_ylabel().startswith("energy")
         assert peak_of(draw) is None
     near = certify(pair, PROTOCOL, [10**13, 10**13 + 1], asks=Asks(simulation=False))
     with pytest.raises(ValueError, match="another initial state than"):

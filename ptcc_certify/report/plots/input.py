@@ -341,7 +341,7 @@ def plot_effort(
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
     >>> [line.get_label() for line in plot_effort(cert).lines]
-    ['simulated (CVODES)', 'certified bound', 'deadline $T$']
+    ['simulated (CVODES)', 'proved bound', 'deadline $T$']
     """
     run = trajectory_of(subject)
     certificate = subject if isinstance(subject, Certificate) else certificate
@@ -351,7 +351,7 @@ def plot_effort(
     ax, energy = axes_of(ax), _energy(run)
     ax.plot(run.t, energy, color=RUN, label="simulated (CVODES)")
     if bound is not None:
-        ax.axhline(bound, color="black", linewidth=0.9, linestyle="--", label="certified bound")
+        ax.axhline(bound, color="black", linewidth=0.9, linestyle="--", label="proved bound")
     ax.set_ylim(0, 1.1 * max(bound or 0.0, float(energy.max(initial=0))) or 1)
     draw_deadlines(ax, run)
     label = r"energy spent, $\int \|u\|^2\, dt$"
