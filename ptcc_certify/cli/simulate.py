@@ -27,6 +27,7 @@ from ptcc_certify.model.case import Case
 from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.refusals import refuse_in_places
 from ptcc_certify.model.run import Run
 
 if TYPE_CHECKING:
@@ -250,8 +251,8 @@ def _run_beside(
         given.append("dimension")
     if given:
         raise ParameterError(f"{flag_of(given[0])}: is not simulated with {name}; leave it out")
-    if leaders is not None and leaders.growth is not None and places is not None:
-        raise ParameterError("--growth is not for formations, whose places it changes; leave one of the two out")
+    if places is not None:
+        refuse_in_places(leaders)
     families.refuse_restricted(options)
     if options["noise"] is not None:  # what is heard is off by it
         asks, limits = Asks(noise=options["noise"]), shared.limits_of(options)

@@ -216,17 +216,18 @@ def progress(steps: Sequence[str], quiet: bool = False) -> Iterator[Callable[[st
 
     A graph that has something proved as a family takes the steps of one, of which some have other names.
     """
-    began, last, place = time.monotonic(), "", {step: k for k, step in enumerate(steps)}
+    began, last, done = time.monotonic(), "", 0
     with _bar("TimeElapsedColumn", quiet=quiet) as add:
         update = add("", total=len(steps))
 
         def begin(step: str) -> None:
-            nonlocal began, last
+            nonlocal began, last, done
             if last:
                 LOG.info("%s: %.3f s", last, time.monotonic() - began)
             began, last = time.monotonic(), step
             if step:
-                update(description=step, **({"completed": place[step]} if step in place else {}))
+                done = steps.index(step) if step in steps else done
+                update(completed=done, description=step)
 
         yield begin
         begin("")

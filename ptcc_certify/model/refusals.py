@@ -101,6 +101,18 @@ def asked_of_signals(structure: Structure, case: Case) -> bool:
     return groups and messages.value_error > 0 and messages.gain_cap is None
 
 
+def refuse_in_places(leaders: MovingLeaders | None) -> None:
+    """Refuse agents that move by themselves in a formation: at other places they move otherwise.
+
+    Raises
+    ------
+    ParameterError
+        They do.
+    """
+    if leaders is not None and leaders.growth is not None:
+        raise ParameterError("growth", "is not for formations, whose places it changes; leave one of the two out")
+
+
 def refuse_of_families(case: Case) -> None:
     """Refuse what is asked of one graph alone, where a family is given."""
     given = [] if case.asks.method == "best" else ["method"]
@@ -111,8 +123,7 @@ def refuse_of_families(case: Case) -> None:
         given.remove("agents")  # in a formation
         if case.agents.biases is not None:
             raise ParameterError("biases", "of a family make other places in every graph; give offsets instead")
-        if case.leaders is not None and case.leaders.growth is not None:
-            raise ParameterError("growth", "is not for formations, whose places it changes; leave one of the two out")
+        refuse_in_places(case.leaders)
     if given:
         mend = {"limits": "families take one gain cap alone; leave others out", "delta": _NOT_LATE["delta"]}
         text = "is not for families of graphs yet, nor for what one graph has proved as one; leave it out"
