@@ -58,7 +58,7 @@ class WeightRange(NamedTuple):
     least : float
         0 of an edge that may fail.
     late : str
-        How late is what is heard over it, in words; empty where that is not told edge by edge.
+        How late is what is heard over it; empty where that is not told edge by edge.
     """
 
     arrow: Arrow
@@ -106,8 +106,8 @@ def plot_graph(
         Of the nodes, in place of those of their camps: the second camp is then drawn as squares, unbalanced leaders as
         diamonds, and the legend tells these alone.
     delays : mapping of (source, target) to number, optional
-        How late is what is heard over each edge of one graph, in units of time: written at its arrow. By default those
-        of a certificate whose messages have delays of their own.
+        How late is what is heard over each edge of one graph, in units of time: written at its arrow in place of the
+        weight, which its width tells. By default those of a certificate whose messages have delays of their own.
 
     Returns
     -------
@@ -249,7 +249,12 @@ def _draw_mode(
         _draw_coloured(ax, place, radius, groups, structure.leaders, colours)
     among = among or edges
     differ, largest = len({edge.text for edge in among}) > 1, max((edge.arrow.size for edge in among), default=1.0)
-    texts = [", ".join(filter(None, (edge.text * differ, edge.late))) for edge in edges]
+    late = any(edge.late for edge in edges)
+    texts = [edge.late if late else edge.text * differ for edge in edges]
+    if late:
+        ax.plot(
+            [], [], " ", marker="$0.1$", color="black", markersize=12, markeredgewidth=0, label="how late, at its arrow"
+        )
     _draw_arrows(ax, edges, place, bends, radius, largest if differ else None)
     arrows = [edge.arrow for edge in edges]
     lines = boxes_along(arrows, place, bends)
@@ -285,7 +290,7 @@ def weight_ranges(
             late = [] if delays is None else [delays.get((labels[a], labels[b]))]
             late += [delays.get((labels[b], labels[a]))] if mutual and delays is not None else []
             sizes = dict.fromkeys(f"{float(x):.3g}" for x in late if x)
-            told = f"{' / '.join(sizes)} late" if sizes else ""
+            told = " / ".join(sizes) or ("0" if delays is not None else "")
             result.append(WeightRange(Arrow(a, b, sign, most, mutual), least, told))
     return result
 
