@@ -18,7 +18,7 @@ from ptcc_certify.graphs.io.conversion import is_family
 from ptcc_certify.graphs.io.states import as_states, random_states
 from ptcc_certify.graphs.rationals import shorten, writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
-from ptcc_certify.model.agents import DERIVATIVES, MOST_DIMENSION, PLURALS, Agents
+from ptcc_certify.model.agents import DERIVATIVES, MOST_DIMENSION, MOST_TRACKING, PLURALS, Agents
 from ptcc_certify.model.case import Case
 from ptcc_certify.model.gain import Gain
 from ptcc_certify.model.initial_state import InitialState
@@ -80,7 +80,7 @@ def formation_on_a_line(case: Case, agents: Agents, chains: Chains, of_family: b
 
 
 def with_vehicles(case: Case) -> Case:
-    """Return a case of double integrators that exchange virtual positions as that of these, with late messages.
+    """Return a case of agents that exchange virtual positions as that of these, with late messages.
 
     Raises
     ------
@@ -96,20 +96,46 @@ def with_vehicles(case: Case) -> Case:
         graph = given.modes[0].mandatory
     else:
         given = graph = as_graph(case.graph)
-    chains = read_chains(agents, graph, case.protocol.gain, case.initial)
+    orders = _orders(agents, graph)
+    of_all = replace(agents, order=max(orders), plant=None)
+    chains = read_chains(of_all, graph, case.protocol.gain, case.initial)
     if chains.dimension > 1:
         raise ParameterError("dimension", "what is proved of vehicles on a line holds in each coordinate: give one")
     in_formation = any(h for (h,) in chains.offsets)
     cap = one_cap([agents.cap, *(limit.gain_cap for limit in case.limits), getattr(case.messages, "gain_cap", None)])
-    states = chains.states or ()
-    vehicles = Vehicles(tuple(v for ((_, v),) in states) or (Fraction(0),) * graph.n_nodes)
+    vehicles = _vehicles(chains.states, orders, graph)
     if case.messages is None:
         messages = LateMessages(gain_cap=cap, vehicles=vehicles)
     else:
         messages = replace(case.messages, gain_cap=cap, vehicles=vehicles)
-    begin = InitialState([x for ((x, _),) in states] or None)
+    begin = InitialState([x for ((x, *_),) in chains.states or ()] or None)
     agents = Agents(1, offsets=chains.offsets) if in_formation else None
     return replace(case, graph=given, initial=begin, uncertainty=0, agents=agents, messages=messages, limits=())
+
+
+def _orders(agents: Agents, graph: SignedDigraph) -> tuple[int, ...]:
+    """Return the order of every agent that exchanges virtual positions, or refuse one that is not proved."""
+    if agents.orders is None:
+        return (agents.degree,) * graph.n_nodes
+    orders = [n for (n,) in _states(agents.orders, graph, "orders", 1)]
+    for label, n in zip(graph.labels, orders, strict=True):
+        if n not in range(1, MOST_TRACKING + 1):
+            why = f"of {shorten(label)} is {readable(n)}; give a whole number from 1 to {MOST_TRACKING}"
+            raise ParameterError("orders", why)
+    return tuple(map(int, orders))
+
+
+def _vehicles(states: States | None, orders: tuple[int, ...], graph: SignedDigraph) -> Vehicles:
+    """Return vehicles as they begin; refuse what one of lower order has not."""
+    still = (Fraction(0),) * graph.n_nodes
+    begun = [still, still]
+    for i in range(1, max(orders)) if states is not None else ():
+        begun[i - 1] = tuple(chain[i] for (chain,) in states or ())
+        for label, n, value in zip(graph.labels, orders, begun[i - 1], strict=True):
+            if value and n <= i:
+                why = f"of {shorten(label)} is not 0, an agent of order {n}; give it 0, or another order"
+                raise ParameterError(("v0", "a0")[i - 1], why)
+    return Vehicles(begun[0], orders, begun[1] if 3 in orders else None)
 
 
 def read_offsets(agents: Agents, graph: SignedDigraph, dimension: int, gain: Gain) -> tuple[tuple[Fraction, ...], ...]:

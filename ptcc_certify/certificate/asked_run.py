@@ -60,5 +60,5 @@ def late_run(proof: GraphProof | FamilyProof, late: LateBounds, **options: Any) 
         return None
     if late.tracking_protocol is not None and messages.vehicles is not None:
         virtual = run_virtual_positions(graph, protocol, messages, start, late.leaders, **options)
-        return follow(virtual, late.tracking_protocol, messages.vehicles.v0)
+        return follow(virtual, late.tracking_protocol, messages.vehicles)
     return simulate_late(graph, protocol, messages, start, leaders=late.leaders, **options)

@@ -240,7 +240,7 @@ def judge_rate_beside(proof: GraphProof | FamilyProof, least: Fraction, what: st
     if proof.asked_messages is None or (late is not None and late.direct):
         return None
     if late is None or late.lmi is None:
-        vehicles = proof.velocities is not None and proof.asked_messages.exact
+        vehicles = proof.vehicles is not None and proof.asked_messages.exact
         whose = "of vehicles that exchange virtual positions" if vehicles else f"with {proof.asked_messages.name}"
         return Answer(OPEN, what, f"no rate is proved {whose}")
     rate = 2 * late.lmi.b

@@ -40,7 +40,7 @@ def with_messages(certificate: Certificate) -> Certificate:
     late = bound_late(case)
     if isinstance(proof, FamilyProof) and case.led_by_groups:
         late = with_forms_of_family(late, [(part.component, part.functions) for part in proof.parts])
-    if not isinstance(proof, GraphProof) or late.tracks or late.vehicles is not None:
+    if not isinstance(proof, GraphProof) or late.tracks:
         return certificate.changed(late=late)
     case = replace(late.case, influence=proof.influence, forms=proof.decaying_forms)
     late = with_forms(replace(late, case=case))

@@ -181,7 +181,11 @@ class Proof(OfQuestion):
         return self.asked_leaders is not None and self.asked_leaders.moving
 
     @property
-    def velocities(self) -> Sequence[Fraction] | None:
-        """Initial velocities of vehicles that exchange virtual positions; None without them."""
+    def vehicles(self) -> Mapping[str, Sequence[Fraction]] | None:
+        """Of agents that exchange virtual positions ``v(0)``, of a team ``order`` and ``a(0)``; None without them."""
         vehicles = None if self.late is None else self.late.messages.vehicles
-        return None if vehicles is None else vehicles.v0
+        if vehicles is None:
+            return None
+        orders = None if vehicles.team is None else tuple(map(Fraction, vehicles.team))
+        told = {"order": orders, "v(0)": vehicles.v0, "a(0)": vehicles.a0}
+        return {name: values for name, values in told.items() if values is not None}

@@ -245,8 +245,8 @@ def _use_of_late(proof: GraphProof | FamilyProof, late: LateBounds) -> Use:
     if late.largest <= _NOTHING:
         return Use(True, "", caveat)
     way = 1.0 if late.relative else proof.longest_way
-    if way is not None and (vehicles := late.vehicles) is not None:  # the way on which they brake, beside that to go
-        way += float(max(map(abs, vehicles.v0)) / (vehicles.a1 * late.case.exact.least_gain()))
+    if way is not None and (proved := late.vehicles) is not None:  # the way on which they brake, beside that to go
+        way += float(max(map(abs, proved.vehicles.v0)) / (proved.gains[0] * late.case.exact.least_gain()))
     relative = " from within 1 of it" if late.relative else ""
     remark = f"every {late.whose} within {up(late.largest, 2)} of {late.goal} at T{relative}"
     searched = isinstance(proof, GraphProof) and proof.graph.n_nodes <= EXACT_NODES and late.vehicles is None

@@ -1,19 +1,19 @@
 """Bounds that a file states by agent, which proofs of several kinds may meet: some agents by one, some by another.
 
 They are bounds of what is left at the deadline, and under a capped gain of the input, by rows or by a Lyapunov
-function; and of double integrators that track virtual states, the part on vehicles of section 22 of the format. Every
+function; and of vehicles that track virtual states, the part on these of section 22 of the format. Every
 decay by rows of virtual single integrators ``z_k``, ``|z_k - x*_k| <= u_k (initial y + floor + C)``, carries over to
-the vehicles, which follow ``z_k`` as it is seen through two filters of the first order.
+the vehicles, which follow ``z_k`` as it is seen through filters of the first order.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from operator import mul
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from lmi.exact.decimal_rounding import down, up
 from lmi.exact.numbers import integers, longest, shorten
@@ -26,6 +26,9 @@ from ptcc_certify.checker.reading import RejectedError, length, need
 from ptcc_certify.checker.section_declarations import Agents, Positive
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.stepwise_inputs import AgentSteps, VehicleSteps, Walk
+
+#: A factor, and a column by node that it multiplies.
+Term: TypeAlias = tuple[Fraction, Sequence[int]]
 
 
 @dataclass(frozen=True)
@@ -112,7 +115,7 @@ class Stated:
         """The largest one."""
         return Fraction(max(self.values), self.scale)
 
-    def meet(self, nodes: Sequence[int], *terms: tuple[Fraction, Sequence[int]]) -> None:
+    def meet(self, nodes: Sequence[int], *terms: Term) -> None:
         """Mark the nodes whose bound is at least the sum of columns by node, each times its factor."""
         columns = [column for _, column in terms]
         common = math.lcm(*(factor.denominator for factor, _ in terms))
@@ -268,7 +271,10 @@ class Inputs:
 
 @dataclass(frozen=True, kw_only=True)
 class VehiclesSection:
-    """Double integrators that track virtual states: gains, initial velocities, and bounds by agent."""
+    """Vehicles that track virtual states: gains, initial velocities, and bounds by agent.
+
+    Double integrators, or else of these ``orders``, 1 to 3; where any is 3, with ``a3`` and accelerations ``a0``.
+    """
 
     a1: Positive
     a2: Positive
@@ -276,20 +282,140 @@ class VehiclesSection:
     position: Agents
     velocity: Agents | None = None
     input: Agents | None = None
+    a3: Positive | None = None
+    a0: Agents | None = None
+    orders: Agents | None = None
 
 
 class Passed(NamedTuple):
-    """By what a bound of vehicles grows with ``|v_k(0)|``, and with what falls and what stands of virtual states."""
+    """By what a bound of vehicles grows with what falls and what stands of virtual states, |v_k(0)| and |x_k''(0)|."""
 
-    begun: Fraction
     falling: Fraction
     standing: Fraction
+    begun: Fraction = Fraction(0)
+    pushed: Fraction = Fraction(0)
 
 
-def passed_on(
-    messages: Messages, b: Fraction, left: Fraction, cap: Fraction | None, gains: tuple[Fraction, Fraction]
-) -> tuple[Passed, ...]:
-    """Return what vehicles make of a decay of virtual states, ``y = e^(-b s_c)``, by ``a_1`` and ``a_2``.
+@dataclass(frozen=True)
+class Tracking:
+    """How vehicles of one order follow virtual states, ``|z_k - x*_k| <= Y_k``, that decay like ``e^(-b s)``.
+
+    A vehicle of order n is the virtual one as it is seen through n - 1 filters of the first order: ``q_1 = x``, ``q_n =
+    z + y_n/(a_1 .. a_(n-1))``, ``y_i = r_i/g^(i-1)``, ``r_1 = x - z``, and ``r_(i+1)`` the derivative of ``r_i`` as if
+    ``z`` and ``g`` were constant, plus ``a_i g r_i``. Per unit of the clock, with ``0 <= theta = g'/g^2 <= 1/k``,
+
+        n = 2:   q_1' = a_1 (q_2 - q_1),                                        y_2' = -(a_2 + theta) y_2
+        n = 3:   q_1' = a_1 (q_2 - q_1),   q_2' = a_2 (q_3 - q_2) - theta (q_2 - q_1),   y_3' = -(a_3 + 2 theta) y_3.
+
+    Parameters
+    ----------
+    order : int
+        1, 2 or 3.
+    gains : Fractions
+        ``a_1``, ``a_2`` and, of order 3, ``a_3``.
+    b : Fraction
+        The rate of ``Y``.
+    k : Fraction
+        ``rho2 kappa``.
+    first : Fraction
+        ``g(0)``, the least gain.
+
+    Examples
+    --------
+    >>> two = Fraction(2)
+    >>> for n in (1, 2, 3):
+    ...     print(*map(float, Tracking(n, (two, two, two), Fraction(1, 2), two, two).ahead))
+    1.0 1.0 0.0 0.0
+    1.0 1.0 0.25 0.0
+    1.5 1.0 1.0 0.09375
+    """
+
+    order: int
+    gains: tuple[Fraction, ...]
+    b: Fraction
+    k: Fraction
+    first: Fraction
+
+    @property
+    def follows(self) -> bool:
+        """Whether the gains are large enough for the rate."""
+        a, b = self.gains, self.b
+        return self.order == 1 or (b < a[0] and b <= a[1] and (self.order == 2 or (self.slack > 0 and b <= a[2])))
+
+    @property
+    def lag(self) -> Fraction:
+        """``1/(a_1 - b)``."""
+        return 1 / (self.gains[0] - self.b)
+
+    @property
+    def slack(self) -> Fraction:
+        """``a_2 - b - max theta b/(a_1 - b)``: what the second filter draws more than it must."""
+        return self.gains[1] - self.b - self.b * self.lag / self.k
+
+    @property
+    def ahead(self) -> Passed:
+        """What bounds ``|q_2 - x*_k|``, of order 1 ``|x_k - x*_k|``, by ``Y_k``."""
+        a1, begun, one = self.gains[0], 1 / (self.gains[0] * self.first), Fraction(1)
+        if self.order < 3:
+            return Passed(one, one, begun if self.order == 2 else Fraction(0))
+        drawn = 1 / (a1 * self.slack * self.first)
+        return Passed(self.gains[1] / self.slack, one, (a1 + self.gains[1]) * drawn + begun, drawn / self.first)
+
+    @property
+    def position(self) -> Passed:
+        """What bounds ``|x_k - x*_k|`` by ``Y_k``."""
+        falling, standing, begun, pushed = self.ahead
+        grown = Fraction(1) if self.order == 1 else self.gains[0] * self.lag
+        return Passed(grown * falling, standing, grown * begun, grown * pushed)
+
+    def offsets(self) -> tuple[Passed, ...]:
+        """Return what bounds ``|y_1|`` to ``|y_n|`` by ``|e_k| <= p_k y + n_k``."""
+        zero, first, k = Fraction(0), self.first, self.k
+        if self.order == 1:
+            return ()
+        a1, a2 = self.gains[:2]
+        if self.order == 2:
+            last = [Passed(zero, zero, 1 / first)]
+            second = last[0]
+        else:
+            third = Passed(zero, zero, (a1 + a2) / first, 1 / first**2)
+            second = Passed(
+                (a1 + a1 * self.lag / k) / self.slack,
+                (a1 + 1 / k) / a2,
+                third.begun / self.slack + 1 / first,
+                third.pushed / self.slack,
+            )
+            last = [second, third]
+        p, n, v, x = second
+        return Passed(self.lag * (p + 1), (n + 1) / a1, self.lag * v, self.lag * x), *last
+
+    def velocity_and_input(self) -> tuple[Passed, Passed]:
+        """Return what bounds ``|x_k'|/g`` and ``|u_k|/g^n`` by ``|e_k| <= p_k y + n_k``.
+
+        n = 2:   x'/g = y_2 - a_1 y_1,   u/g^2 = (a_1^2 - a_1 theta) y_1 - (a_1 + a_2) y_2 + a_1 e
+        n = 3:   u/g^3 = (theta a_1 (a_1 - a_2) - a_1^3) y_1 + (a_1^2 + a_1 a_2 + a_2^2 - theta (a_1 + a_2)) y_2
+                         - (a_1 + a_2 + a_3) y_3 + a_1 a_2 e
+        """
+        e, one = Passed(Fraction(1), Fraction(1)), Fraction(1)
+        if self.order == 1:
+            return e, e
+        (a1, a2), theta, y = self.gains[:2], 1 / self.k, self.offsets()
+        velocity = _sum((a1, y[0]), (one, y[1]))
+        if self.order == 2:
+            return velocity, _sum((max(a1**2, a1 * theta - a1**2), y[0]), (a1 + a2, y[1]), (a1, e))
+        own, turn = a1**3, a1 * (a1 - a2) * theta
+        other, slowed = a1**2 + a1 * a2 + a2**2, (a1 + a2) * theta
+        weights = max(own, abs(turn - own)), max(other, slowed - other), a1 + a2 + self.gains[2], a1 * a2
+        return velocity, _sum(*zip(weights, (*y, e), strict=True))
+
+
+def _sum(*terms: tuple[Fraction, Passed]) -> Passed:
+    """Return a sum of bounds, each times its weight."""
+    return Passed(*(sum((w * part[i] for w, part in terms), Fraction(0)) for i in range(4)))
+
+
+def passed_on(messages: Messages, left: Fraction, cap: Fraction | None, tracking: Tracking) -> tuple[Passed, ...]:
+    """Return what vehicles of one order make of a decay of virtual states, ``y = e^(-b s_c)``.
 
     First of positions at ``T``: ``|z_k - x*_k|`` at ``T``, without and with what stands of it; then, under a cap, of
     velocities and inputs up to ``T``: ``p_k`` and ``n_k``, where ``|e_k| <= p_k y + n_k``.
@@ -300,21 +426,22 @@ def passed_on(
     >>> gain = PrescribedGain(Fraction(1), Fraction(1), Fraction(1))
     >>> messages = Messages(gain, Numbers([Fraction(0)]), Fraction(0), False, Fraction(0), Fraction(2))
     >>> one, left = Fraction(1), Fraction(1, 4)
-    >>> for passed in passed_on(messages, one, left, 2 * one, (2 * one, 2 * one)):
-    ...     print(*map(float, passed))
-    0.125 2.0 1.0
-    3.0 4.0 2.0
-    20.0 32.0 20.0
+    >>> tracking = Tracking(2, (2 * one, 2 * one), one, gain.k, messages.least_gain())
+    >>> for passed in passed_on(messages, left, 2 * one, tracking):
+    ...     print(*map(float, passed[:3]))
+    2.0 1.0 0.125
+    4.0 2.0 3.0
+    24.0 16.0 16.0
     """
-    gain, (a1, a2), first, G = messages.gain, gains, messages.least_gain(), messages.gain_cap
-    lag, turn = 1 / (a1 - b), a1 / gain.k + a1 * a1
-    position = Passed(left * lag / first, a1 * lag, Fraction(1))
+    falling, standing, begun, pushed = tracking.position
+    position, G = Passed(falling, standing, begun * left, pushed * left), messages.gain_cap
     if G is None:
         return (position,)
-    y, square = gain_above(gain, G, b, cap), gain_above(gain, G, b / 2, cap) ** 2
-    velocity = Passed(y * (1 + a1 * lag) / first, y * a1 * lag, G)
-    whole = Passed(square * (turn * lag + a1 + a2) / first, square * (turn * lag + a1), (1 / gain.k + 2 * a1) * G * G)
-    return position, velocity, whole
+    found = [position]
+    for power, one in zip((1, tracking.order), tracking.velocity_and_input(), strict=True):
+        y = gain_above(messages.gain, G, tracking.b / power, cap) ** power
+        found.append(Passed(one.falling * y, one.standing * G**power, one.begun * y, one.pushed * y))
+    return tuple(found)
 
 
 class Vehicles:
@@ -342,58 +469,84 @@ class Vehicles:
         lists = {"position": section.position, "velocity": section.velocity, "input": section.input}
         self.stated = [Stated(name, self.labels, values) for name, values in lists.items() if values is not None]
         need(all(min(one.values) >= 0 for one in self.stated), "a bound is negative")
-        self.begun, self.scale = section.v0.over(range(len(self.labels)))
+        everyone = range(len(self.labels))
+        self.orders = [2] * len(self.labels) if section.orders is None else _orders(section.orders.over(everyone))
+        third = 3 in self.orders
+        need([section.a3 is not None, section.a0 is not None] == [third, third], "a3 and a0 are there iff order 3 is")
+        self.begun, self.scale = section.v0.over(everyone)
+        self.pushed, self.unit = ([0] * len(self.labels), 1) if section.a0 is None else section.a0.over(everyone)
+        need(not any(v for v, n in zip(self.begun, self.orders, strict=True) if n == 1), "v0 of an agent of order 1")
+        need(not any(x for x, n in zip(self.pushed, self.orders, strict=True) if n < 3), "a0 of an order below 3")
+        self.gains = section.a1, section.a2, *([] if section.a3 is None else [section.a3])
         self.steps: VehicleSteps | None = None
 
     def by_rows(self, rows: Rows, decay: Decay) -> None:
         """Mark what is at least as large as this decay makes it, unless it is too fast for the gains."""
         followers, b, M = rows.followers, decay.b, decay.initial
-        begun, others = [abs(v) for v in self.begun], followers.others
+        others = followers.others
         if self.messages.leaders is not None:
-            need(not any(begun[v] for v in others), "an initial velocity of a leader that moves as it likes")
+            moved = any(self.begun[v] or self.pushed[v] for v in others)
+            need(not moved, "an initial velocity of a leader that moves as it likes")
         bits = length((M, decay.floor, decay.highest))
         spend(100, bits, bits, "bounds of vehicles")
-        if (passed := self._passed(b, decay.left, decay.cap)) is None:
-            return
         (heard, unit), (degrees, _) = rows.largest, followers.degrees
-        of, common = followers.nodes, rows.scale * unit
-        pulled, own = list(map(mul, degrees, rows.u)), [begun[v] for v in of]
-        first = passed[0].falling * (M * decay.left + decay.drift) + decay.floor
-        self.stated[0].meet(of, (passed[0].begun / self.scale, own), (first / rows.scale, rows.u))
-        for one, (by_begun, falling, standing) in zip(self.stated[1:], passed[1:], strict=True):
-            one.meet(
-                of,
-                (by_begun / self.scale, own),
-                (2 * falling * M / common, pulled),
-                (-b * falling * M / rows.scale, rows.u),
-                (standing * decay.highest / common, heard),
-                (standing * self.messages.wrong / unit, degrees),
+        common, pulled = rows.scale * unit, list(map(mul, degrees, rows.u))
+
+        def position(passed: Passed) -> tuple[Term, ...]:
+            first = passed.falling * (M * decay.left + decay.drift) + passed.standing * decay.floor
+            return ((first / rows.scale, rows.u),)
+
+        def moving(passed: Passed) -> tuple[Term, ...]:
+            return (
+                (2 * passed.falling * M / common, pulled),
+                (-b * passed.falling * M / rows.scale, rows.u),
+                (passed.standing * decay.highest / common, heard),
+                (passed.standing * self.messages.wrong / unit, degrees),
             )
-        for one, (by_begun, _, _) in zip(self.stated, passed, strict=True):
-            one.meet(others, (by_begun / self.scale, [begun[v] for v in others]))
+
+        self._meet(followers.nodes, b, decay.left, decay.cap, position, moving)
+        self._meet(others, b, decay.left, decay.cap, lambda _: (), lambda _: ())
 
     def of_all(self, decay: DecayOfAll) -> None:
         """Mark what is at least as large as a decay of all agents makes it, unless it is too fast for the gains."""
-        if (passed := self._passed(decay.b, decay.left, decay.cap)) is None:
-            return
         columns = [x * decay.left for x in decay.away], decay.floor, decay.falling, decay.standing
         (away, floor, falling, standing), scale = integers(columns)
-        begun = [abs(self.begun[v]) for v in decay.nodes]
-        pairs = [(away, floor), *[(falling, standing)] * 2]
-        for one, row, (falls, stands) in zip(self.stated, passed, pairs, strict=False):
-            terms = (row.begun / self.scale, begun), (row.falling / scale, falls), (row.standing / scale, stands)
-            one.meet(decay.nodes, *terms)
 
-    def _passed(self, b: Fraction, left: Fraction, cap: Fraction | None) -> tuple[Passed, ...] | None:
-        """Return what vehicles make of a decay of virtual states; None if it is too fast for the gains."""
-        a1, a2 = gains = self.section.a1, self.section.a2
-        bits = length((b, left, *gains))
-        spend(100, bits, bits, "bounds of vehicles")
-        return None if b >= a1 or b > a2 else passed_on(self.messages, b, left, cap, gains)
+        def position(passed: Passed) -> tuple[Term, ...]:
+            return (passed.falling / scale, away), (passed.standing / scale, floor)
+
+        def moving(passed: Passed) -> tuple[Term, ...]:
+            return (passed.falling / scale, falling), (passed.standing / scale, standing)
+
+        self._meet(decay.nodes, decay.b, decay.left, decay.cap, position, moving)
+
+    def _meet(
+        self,
+        nodes: Sequence[int],
+        b: Fraction,
+        left: Fraction,
+        cap: Fraction | None,
+        position: Callable[[Passed], tuple[Term, ...]],
+        moving: Callable[[Passed], tuple[Term, ...]],
+    ) -> None:
+        """Mark what vehicles make of a decay of virtual states by node, order by order; nothing if it is too fast."""
+        bits = length((b, left, *self.gains))
+        for order in sorted(set(self.orders)):
+            chosen = [i for i, v in enumerate(nodes) if self.orders[v] == order]
+            tracking = Tracking(order, self.gains, b, self.messages.gain.k, self.messages.least_gain())
+            spend(200, bits, bits, "bounds of vehicles")
+            if not chosen or not tracking.follows:
+                continue
+            of = [nodes[i] for i in chosen]
+            begun, pushed = ([abs(column[v]) for v in of] for column in (self.begun, self.pushed))
+            passed_all = passed_on(self.messages, left, cap, tracking)
+            for one, passed, terms in zip(self.stated, passed_all, (position, moving, moving), strict=False):
+                own = [(factor, [column[i] for i in chosen]) for factor, column in terms(passed)]
+                one.meet(of, (passed.begun / self.scale, begun), (passed.pushed / self.unit, pushed), *own)
 
     def along(self, walk: Walk) -> VehicleSteps | None:
-        """Return what follows vehicles from instant to instant; None without a cap of the gain."""
-        if self.messages.gain_cap is not None:
+        """Return what follows vehicles from instant to instant; None without a cap of the gain, or of other orders."""
+        if self.messages.gain_cap is not None and set(self.orders) == {2}:
             begun = [Fraction(abs(self.begun[v]), self.scale) for v in walk.steps.nodes]
             self.steps = VehicleSteps(walk, begun, self.section.a1, self.section.a2)
         return self.steps
@@ -408,7 +561,14 @@ class Vehicles:
     def close(self, doc: Document) -> None:
         """Verify that a decay meets what is stated of every agent."""
         doc.at = "messages.vehicles"
-        doc.open("late-vehicles", "messages.vehicles")
+        doc.open("late-vehicles" if self.section.orders is None else "late-team", "messages.vehicles")
         for one in self.stated:
             one.close()
         doc.done(f"a_1 = {down(self.section.a1)}, at most {up(self.stated[0].largest)}")
+
+
+def _orders(column: tuple[Sequence[int], int]) -> list[int]:
+    """Return orders of agents, whole numbers from 1 to 3."""
+    values, scale = column
+    need(scale == 1 and min(values) >= 1 and max(values) <= 3, "an order that is none of 1, 2 and 3")
+    return list(values)

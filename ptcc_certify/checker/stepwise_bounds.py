@@ -43,6 +43,18 @@ def fixed_decay_above(x: int) -> int:
     return -(-(ONE * ONE) // total)
 
 
+def fixed_decay_below(x: int) -> int:
+    """Bound ``e^-x`` from below by ``1 - x + x^2/2 - x^3/6``, or 0; both are multiples of ``2^-30``.
+
+    Examples
+    --------
+    >>> fixed_decay_below(ONE // 2) / ONE, fixed_decay_below(2 * ONE)  # 29/48
+    (0.604166666045785, 0)
+    """
+    cubed = 6 * ONE**3 - 6 * x * ONE**2 + 3 * x**2 * ONE - x**3
+    return max(cubed // (6 * ONE**2), 0)
+
+
 class Step(NamedTuple):
     """From one instant to the next: bounds of deviations at both, and in between of what is heard over ``D_k``."""
 

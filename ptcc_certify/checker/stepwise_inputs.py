@@ -4,7 +4,7 @@ From ``t_(i-1)`` to ``t_i`` the gain is at most ``g_i = g(t_i)``, and ``|e_k| <=
 the step begins and what is heard. Vehicles that track such agents have ``r' = -a_1 g r + r_2 - g e``, ``r = x - z``,
 ``r_2' = -a_2 g r_2``, ``r_2(0) = v(0)``, so that with ``y = a_1 |r_k|/D_k`` and ``h = m_k + |r_2|/(g D_k)``
 
-    y_i <= h + max(y_(i-1) - h, 0) e^(-a_1 d_i),    y_0 = 0,    d_i what the clock goes,
+    y_i <= h + (y_(i-1) - h) e^(-a_1 d_i),    y_0 = 0,    d_i what the clock goes, or, below h, g_i (t_i - t_(i-1)),
 
     |v_k| <= |r_2| + g D_k y,    |u_k| <= (g' y + a_1 g^2 (y + m_k)) D_k + (a_1 + a_2) g |r_2|,    g' <= (g - rho1)^2/k.
 
@@ -24,7 +24,7 @@ from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.input_formulas import Limits, clock_between
 from ptcc_certify.checker.message_ages import Messages
 from ptcc_certify.checker.reading import length
-from ptcc_certify.checker.stepwise_bounds import FIXED, ONE, Step, Steps, fixed_decay_above
+from ptcc_certify.checker.stepwise_bounds import FIXED, ONE, Step, Steps, fixed_decay_above, fixed_decay_below
 
 
 class Walk:
@@ -52,6 +52,8 @@ class Walk:
         What acts at every instant; ascending to the cap, at ``T`` as before without one.
     ways : sequence of Fraction
         How far its clock goes between two of them, from below; without a cap None to ``T``.
+    longest : list of Fraction
+        The same from above, under a cap.
     """
 
     def __init__(
@@ -74,6 +76,7 @@ class Walk:
         degrees = [graph.diagonal[v] for v in nodes]
         self.steps = kind(graph, nodes, degrees, start, messages.wrong * scale, messages.parts, push)
         self.unit = Fraction(self.steps.largest, scale << FIXED)
+        self.longest = [g * (b - a) for g, (a, b) in zip(self.gains[1:], pairwise(instants), strict=True)]
         self._told = instants, messages.delay, self.ways, gains if leaders is not None else []
 
     def __iter__(self) -> Iterator[Step]:
@@ -134,7 +137,8 @@ class VehicleSteps:
         size = walk.size * gains[0]
         self._begun = [ceil(v / (size * D)) for v, D in zip(begun, walk.steps.degrees, strict=True)]
         self.lag, self.most, self.velocity, self.input = ([0] * len(begun) for _ in range(4))
-        self._decays = [fixed_decay_above(int(ONE * a1 * way)) for way in ways]
+        pairs = zip(ways, walk.longest, strict=True)
+        self._decays = [(fixed_decay_above(int(ONE * a1 * x)), fixed_decay_below(ceil(ONE * a1 * y))) for x, y in pairs]
         clock, top, self._factors = Fraction(0), gains[-1], list[list[int]]()
         for way, low, high in zip(ways, gains, gains[1:], strict=False):
             # of begun, which is |r_2| over g(0), in h, |v_k| and |u_k|; of y in these; of m_k in |u_k|
@@ -149,12 +153,12 @@ class VehicleSteps:
 
     def step(self, i: int, step: Step) -> None:
         """Take a step of the walk."""
-        decay, (ahead, speed, push, grown, own, pulled) = self._decays[i], self._factors[i]
+        (above, below), (ahead, speed, push, grown, own, pulled) = self._decays[i], self._factors[i]
         for k, (x, other, v, y) in enumerate(zip(step.begin, step.heard, self._begun, self.lag, strict=True)):
             m = x + other
             h = m - (-v * ahead >> FIXED)
-            most = max(y, h)
-            self.lag[k], self.most[k] = h - (-max(y - h, 0) * decay >> FIXED), most
+            self.lag[k] = h - ((h - y) * (below if y < h else above) >> FIXED)
+            self.most[k] = most = max(y, self.lag[k])
             self.velocity[k] = max(self.velocity[k], -(-(v * speed + most * grown) >> FIXED))
             self.input[k] = max(self.input[k], -(-(v * push + most * own + m * pulled) >> FIXED))
 

@@ -34,7 +34,7 @@ _MOST_ORDER = 8
 #: Options that need ``--agents``.
 _OWN = (*declared.names_of(Agents)[1:], "v0", "a0")
 
-#: Where double integrators may do so, and what is proved of those that do.
+#: Where agents of order 2 or 3 may do so, and what is proved of those that do.
 _EXCHANGE = "let them exchange virtual positions: --exchange virtual; or"
 _OF_VEHICLES = {*declared.names_of(LateMessages), *declared.names_of(MovingLeaders)} - {"own_delay", "sign_gain"}
 #: What is said where late messages are asked of agents of order n; then what makes them such is named.
@@ -65,7 +65,7 @@ def agents_of(options: Options) -> Agents | None:
 
 def _named_agents(options: Options) -> Agents | None:
     """Return the agents that the options name, single integrators among them; None if they name none."""
-    kind = options["agents"]
+    kind = options["agents"] or ("double-integrator" if options["orders"] is not None else None)
     if kind is None:
         given = [name for name in _OWN if options[name] is not None]
         if given and not {"offsets", "biases"} & set(given):
@@ -82,12 +82,20 @@ def _named_agents(options: Options) -> Agents | None:
     if options["plant"] is not None:
         plant = [declared.exact_number(text, "--plant") for text in options["plant"].split(",")]
     numbers = {name: options[name] for name in ("drag", "rest", "cascade", "decay", "exchange")}
+    mixed = options["orders"]
     for least, (name, quantity) in enumerate((("v0", "velocity"), ("a0", "acceleration")), start=2):
-        if options[name] is not None and options[name].strip() != "0" and int(order) < least:
+        told = options[name] is not None and options[name].strip() != "0"
+        if told and mixed is None and int(order) < least:
             why = f"agents of order {order} have no {quantity} to begin with"
             raise ParameterError(f"{declared.flag_of(name)}: {why}; leave it out, or give --agents {least}")
     return Agents(
-        int(order), plant, offsets=options["offsets"], biases=options["biases"], gain_cap=options["gain_cap"], **numbers
+        int(order),
+        plant,
+        offsets=options["offsets"],
+        biases=options["biases"],
+        gain_cap=options["gain_cap"],
+        **numbers,
+        orders=mixed,
     )
 
 
@@ -105,6 +113,10 @@ def agents_and_states(
     if not (certified and d == 1 and (agents.of_paper or agents.virtual)):
         _refuse_unproved(options, certified)
     agents = _in_places(agents, options, graph, d)
+    if isinstance(agents.orders, str):
+        from dataclasses import replace
+
+        agents = replace(agents, orders=read_initial_state(agents.orders, None, graph, "--orders"))
     given = [options["v0"], options["a0"]]
     later = [
         None if text is None or text.strip() == "0" else read_vectors(text, [options["seed"], i + 2], graph, d, flag)
@@ -153,7 +165,7 @@ def _in_places(agents: Agents, options: Options, graph: SignedDigraph, dimension
 
 
 def exchanges_virtual(options: Options) -> bool:
-    """Tell whether double integrators exchange virtual positions: what is certified then is of families, too."""
+    """Tell whether agents exchange virtual positions: what is certified then is of families, too."""
     agents = agents_of(options)
     return agents is not None and agents.virtual
 
@@ -165,7 +177,7 @@ def agents_flags(options: Options) -> str:
 
 def refuse_agents_of_family(options: Options, verb: str) -> None:
     """Refuse agents of order n where a family of graphs is given, by the options that make them or belong to them."""
-    taken = ("offsets", "biases", "exchange", "v0")  # beside what families take, or advised with it
+    taken = ("offsets", "biases", "exchange", "orders", "v0", "a0")  # beside what families take, or advised with it
     alone = [name for name in _OWN if options[name] is not None and name not in taken]
     if options["agents"] is None and options["exchange"] is None and alone:  # no agents are advised, to be refused then
         why = f"is for agents of order n, which families of graphs do not take yet; leave it out, or {verb} one graph"
@@ -189,10 +201,10 @@ def refuse_agents_of_family(options: Options, verb: str) -> None:
 
 
 def _may_exchange(options: Options) -> bool:
-    """Tell whether agents are double integrators that could exchange virtual positions, of which more is proved."""
-    plain = all(options[name] is None for name in _OWN if name not in ("v0", "offsets"))
+    """Tell whether agents are of an order in which they could exchange virtual positions, of which more is proved."""
+    plain = all(options[name] is None for name in _OWN if name not in ("v0", "a0", "offsets"))
     plain = plain and not options.get("own_delay") and options.get("kind") == "nominal"
-    return options["agents"] in ("double-integrator", "2") and plain
+    return str(NAMES.get(options["agents"], options["agents"])) in ("2", "3") and plain
 
 
 def _refuse_unproved(options: Options, certified: bool) -> None:
@@ -246,15 +258,15 @@ def run_of_agents(case: Case, samples: int, steps: int | None, **pattern: Any) -
     if late is not None and (tracking := late.tracking_protocol) is not None:
         from ptcc_certify.simulation import virtual_positions
 
-        x0, v0 = ([float(x) for x in values] for values in (certificate.initial_state, late.vehicles.v0))
+        x0, vehicles = [float(x) for x in certificate.initial_state], late.vehicles.vehicles
         if late.messages.exact and late.leaders is None:
             motion = virtual_positions.simulate_vehicles(
-                certificate.graph, tracking, x0, v0, samples=samples, steps=steps
+                certificate.graph, tracking, x0, vehicles, samples=samples, steps=steps
             )
         else:
             beside = certificate.protocol, late.messages, x0, late.leaders
             run = virtual_positions.run_virtual_positions(certificate.graph, *beside, **pattern)
-            motion = virtual_positions.follow_in_motion(run, tracking, late.vehicles.v0)
+            motion = virtual_positions.follow_in_motion(run, tracking, vehicles)
         places = certificate.offsets
         return motion if places is None else motion.in_places(np.array([float(h) for h in places]))
     part = certificate.agents

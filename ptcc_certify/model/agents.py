@@ -15,6 +15,8 @@ from ptcc_certify.model.parameters import parameter, readable
 
 #: Largest order, and largest dimension of space.
 MOST_ORDER, MOST_DIMENSION = 8, 8
+#: Largest order of agents that track virtual positions.
+MOST_TRACKING = 3
 #: Largest ``T (1 + max |a_i|)`` of agents that move by themselves, and longest numbers, in bits.
 MOST_MOTION, LONGEST_BITS = 100, 2000
 #: Largest ``R`` that is asked for.
@@ -56,9 +58,11 @@ class Agents:
     gain_cap : number or str, optional
         What the gain is at most, in 1/time/weight; then something is left at ``T``.
     exchange : {"states", "virtual"}, optional
-        What double integrators hear of each other: relative positions and velocities, or virtual positions, which each
-        tracks by its own state alone. The latter goes with late messages, uncertain weights and leaders that move; see
-        :class:`~ptcc_certify.model.virtual_positions.TrackingProtocol`.
+        What agents hear of each other: relative positions, velocities and so on, or virtual positions, which each of
+        order 2 or 3 tracks by its own state alone. The latter goes with late messages, uncertain weights and leaders
+        that move; see :class:`~ptcc_certify.model.virtual_positions.TrackingProtocol`.
+    orders : state-like, optional
+        Of a mixed team: the order of every agent, 1 to 3, in place of ``order``. They exchange virtual positions.
 
     Raises
     ------
@@ -102,10 +106,13 @@ give 4, from which on the input is bounded
     gain_cap: Exact | None = None
     exchange: str | None = option(
         "--exchange",
-        "Double integrators: what they hear of each other; virtual positions may come late.",
+        "Agents: what they hear of each other; virtual positions may come late.",
         shown="states",
         example='"virtual"',
         choices=EXCHANGES,
+    )
+    orders: Any = option(
+        "--orders STATE", "A mixed team: the order of every agent, 1 to 3, like --x0.", example='"team.csv"'
     )
 
     def __post_init__(self) -> None:
@@ -126,6 +133,8 @@ give 4, from which on the input is bounded
             if plant[-1]:
                 raise ParameterError("drag", "is the last number of plant; give one of them")
             plant[-1] = _number("drag", self.drag)
+        if self.orders is not None and self.exchange is None:
+            object.__setattr__(self, "exchange", "virtual")
         values: dict[str, Any] = {"order": order, "plant": tuple(plant), "drag": None}
         for name in ("rest", "cascade", "decay", "gain_cap"):
             value = getattr(self, name)
@@ -140,6 +149,9 @@ give 4, from which on the input is bounded
             raise ParameterError("exchange", f"= {shorten(repr(self.exchange))} is none of {', '.join(EXCHANGES)}")
         if self.virtual:
             self._refuse_beside_virtual()
+        elif self.orders is not None:
+            mend = "are of agents that exchange virtual positions; give "
+            raise ParameterError("orders", (mend, Change("exchange", "virtual")))
         if self.cascade is not None:
             self._refuse_beside_cascade()
         n, decay = self.degree, self.decay_rate
@@ -170,9 +182,10 @@ give 4, from which on the input is bounded
 
     def _refuse_beside_virtual(self) -> None:
         """Refuse what is not proved where virtual positions are exchanged."""
-        begin = "= virtual is proved of double integrators"
-        if self.degree != 2:
-            raise ParameterError("exchange", f"{begin}; these agents are of order {self.degree}: not proved yet")
+        if self.degree > MOST_TRACKING or (self.degree == 1 and self.orders is None):
+            mend = ": single integrators exchange their positions as they are; leave it out"
+            mend = mend if self.degree == 1 else f"; these are of order {self.degree}: not proved yet"
+            raise ParameterError("exchange", f"= virtual is proved of agents of order 2 or 3{mend}")
         given = {name: getattr(self, name) for name in ("rest", "cascade", "decay", "biases")}
         name = next((name for name, value in given.items() if value is not None), None)
         name = ("plant" if self.coefficients[0] else "drag") if any(self.coefficients) else name
@@ -242,7 +255,8 @@ give 4, from which on the input is bounded
     @property
     def of_paper(self) -> bool:
         """Whether these are single integrators that run the paper's protocol, about their places if they have any."""
-        return self.degree == 1 and not any(self.coefficients) and self.decay is None
+        plain = not any(self.coefficients) and self.decay is None and not self.virtual
+        return self.degree == 1 and plain
 
     def text(self) -> str:
         """Tell the agents in a few words.

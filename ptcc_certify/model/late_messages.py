@@ -52,7 +52,7 @@ class LateMessages:
     gain_cap : number or str, optional
         The gain is at most this, 1/time/weight; ``own_delay`` asks for it.
     vehicles : Vehicles, optional
-        Double integrators that exchange virtual states, and track these; then nothing need be late, lost or rounded.
+        Of order 2 or 3, that exchange virtual states, and track these; then nothing need be late, lost or rounded.
     leaders : MovingLeaders, optional
         Of which these are heard, and what disturbs their followers; then nothing need be late, lost or rounded, either.
 

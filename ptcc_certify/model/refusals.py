@@ -26,14 +26,14 @@ _NOT_OF_AGENTS = {
     "limits": "give Agents(gain_cap=..) instead of a gain cap; a stop and sampling are not proved for them",
     "delta": "take the sliding-mode protocol, which disturbances within delta do not move",
     "noise": "leave it out",
-    "messages": "leave it out, or let double integrators exchange virtual positions, which may come late: "
+    "messages": "leave it out, or let agents of order 2 or 3 exchange virtual positions, which may come late: "
     "Agents(order=2, exchange='virtual')",
-    "leaders": "leave it out; their leaders move as their plant does, unless double integrators exchange virtual "
+    "leaders": "leave it out; their leaders move as their plant does, unless agents exchange virtual "
     "positions: Agents(order=2, exchange='virtual')",
     "disturbance": "leave it out: what holds holds for every disturbance within delta",
 }
 _NO_SET = "is not taken up here, bounds are from one initial state, x0; leave it out"
-#: What is not proved of double integrators that exchange virtual positions, of all that may be asked.
+#: What is not proved of agents that exchange virtual positions, of all that may be asked.
 _NOT_OF_VEHICLES = ("stop_before", "sample_period", "noise", "delta", "disturbance", "initial_set", "sigma0")
 _WORDS_OF_VEHICLES = {"protocol": "the sliding-mode protocol "}
 #: What is not certified beside late messages, and what to do instead.
@@ -155,7 +155,7 @@ def refuse_agents(case: Case) -> None:
 
 
 def refuse_beside_virtual_positions(case: Case) -> None:
-    """Refuse what is not proved of double integrators that exchange virtual positions.
+    """Refuse what is not proved of agents that exchange virtual positions.
 
     Raises
     ------

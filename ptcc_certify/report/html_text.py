@@ -6,7 +6,7 @@ What holds HTML is :class:`markupsafe.Markup`, which the templates print as it i
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from decimal import Decimal, localcontext
 from fractions import Fraction
 from functools import lru_cache
@@ -298,18 +298,18 @@ def agent_parts(saved: Certificate) -> list[str]:
 
 def state_columns(
     saved: Certificate,
-    heads: tuple[str, str, str, str, str],
+    heads: tuple[str, Mapping[str, str], str, str, str],
     agents: Sequence[int],
     written: Callable[[tuple[Fraction, Fraction]], str],
 ) -> dict[str, list[str]]:
-    """Return initial states, ``v(0)`` of vehicles, ``sigma(0)`` and final states, as far as there are, by their heads.
+    """Return initial states, what vehicles have, ``sigma(0)`` and final states, as far as there are, by their heads.
 
     The last head is for what an undecided certificate says of the final state; ``written`` writes a proved interval.
     """
     x0, sigma0, end = saved.proof.initial_positions or (), saved.sigma0 or (), saved.graph_proof.final_positions
     columns = {heads[0]: [rational(x0[k]) for k in agents]}
-    if (v0 := saved.proof.velocities) is not None:
-        columns[heads[1]] = [rational(v0[k]) for k in agents]
+    for name, values in (saved.proof.vehicles or {}).items():
+        columns[heads[1][name]] = [rational(values[k]) for k in agents]
     if not saved.direct:
         columns[heads[2]] = [rational(sigma0[k]) for k in agents]
     if end is not None and (intervals := end.intervals):

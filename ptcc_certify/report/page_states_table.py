@@ -20,6 +20,9 @@ from ptcc_certify.report.html_text import above, below, enclosed, rational
 #: Agents up to which each has a row, and how many there are of either extreme above.
 ROWS, EXTREMES = 60, 10
 
+#: Heads of what vehicles have.
+OF_VEHICLES = {"order": "Order", "v(0)": "Initial velocity", "a(0)": "Initial acceleration"}
+
 
 def states_table(saved: Certificate) -> tuple[str, list[Any], list[str]]:
     """Return caption, rows and heads of the table of initial and final states: of all agents, or of the extremes."""
@@ -67,7 +70,7 @@ def _tabled(saved: Certificate) -> list[int]:
 def _of_graph(saved: Certificate) -> dict[str, list[Any]]:
     if saved.initial_state is None:
         return {}
-    heads = ("Initial state", "Initial velocity", "\u03c3(0)", "State at the deadline", "Limit, if it settles")
+    heads = ("Initial state", OF_VEHICLES, "\u03c3(0)", "State at the deadline", "Limit, if it settles")
     agents, parts = _tabled(saved), texts.agent_parts(saved)
     columns: dict[str, list[Any]] = {"Part": [parts[k] for k in agents]}
     if saved.proof.offsets is not None:
@@ -102,9 +105,9 @@ def _of_family(saved: Certificate) -> tuple[str, list[Any], list[str]]:
     rows: list[tuple[Any, ...]] = list(state_rows(saved)[:ROWS])
     finals = states_of_signal(saved.family_proof)
     heads = ["Agent", "Camp", "Initial state"]
-    if (v0 := saved.proof.velocities) is not None:
-        heads.append("Initial velocity")
-        rows = [(*begin, rational(v), end) for (*begin, end), v in zip(rows, v0, strict=False)]
+    for name, values in (saved.proof.vehicles or {}).items():
+        heads.append(OF_VEHICLES[name])
+        rows = [(*begin, rational(x), end) for (*begin, end), x in zip(rows, values, strict=False)]
     if (places := saved.proof.offsets) is not None:
         heads.append("Place h")
         rows = [(*begin, rational(h), end) for (*begin, end), h in zip(rows, places, strict=False)]

@@ -45,6 +45,8 @@ _COLUMN, _HEAD = 229, 78
 _ELSEWHERE = {"graph", "family", "read", "nodes", "mode", "structure", "protocol", "claim", "function"}
 _ELSEWHERE |= {"time limit", "note", "proof", "verdict"}
 _DOWN_TO = "down to the dotted line, below which the integrator resolves nothing."
+#: Heads of what vehicles have.
+_OF_VEHICLES = {"order": "$n_{k}$", "v(0)": r"$\dot x_{k}(0)$", "a(0)": r"$\ddot x_{k}(0)$"}
 #: What a behaviour is, in symbols.
 _MEANINGS = {
     "stability": r"$x_{k}(t) \to 0$ for every $k$",
@@ -275,7 +277,7 @@ def _states(saved: Certificate) -> tuple[list[str], list[tuple[str, ...]]]:
     """Return heads and rows of the table of places in a formation, and of initial and final states."""
     if (saved.initial_state is None and saved.proof.offsets is None) or saved.proof.agents is not None:
         return [], []
-    heads = ("$x_{k}(0)$", r"$\dot x_{k}(0)$", r"$\sigma_{k}(0)$", "at the deadline", "limit, if it settles")
+    heads = ("$x_{k}(0)$", _OF_VEHICLES, r"$\sigma_{k}(0)$", "at the deadline", "limit, if it settles")
     agents = range(min(saved.graph_proof.graph.n_nodes, texts.LISTED))
     numbers = (
         {} if saved.proof.offsets is None else {"$h_{k}$": [texts.rational(saved.proof.offsets[k]) for k in agents]}
@@ -299,8 +301,8 @@ def _family_states(saved: Certificate) -> tuple[list[str], list[tuple[str, ...]]
     if (places := saved.proof.offsets) is not None:
         columns["$h_{k}$"] = _in_math(map(texts.rational, places[: texts.LISTED]))
     columns["$x_{k}(0)$"] = _in_math(begins)
-    if (v0 := saved.proof.velocities) is not None:
-        columns[r"$\dot x_{k}(0)$"] = _in_math(map(texts.rational, v0[: texts.LISTED]))
+    for name, values in (saved.proof.vehicles or {}).items():
+        columns[_OF_VEHICLES[name]] = _in_math(map(texts.rational, values[: texts.LISTED]))
     if not saved.direct:
         columns[r"$\sigma_{k}(0)$"] = _in_math(map(texts.rational, (saved.sigma0 or ())[: texts.LISTED]))
     if any(end is not None for end in ends):

@@ -253,7 +253,7 @@ class Conditions(ByValue):
     places : (N,) array or None
         Those of a formation; then the ``states`` of a run are less these, and tables and figures tell its positions.
     tracking : TrackingProtocol or None
-        By which the agents are double integrators that track those of another run.
+        By which the agents are vehicles that track those of another run.
     """
 
     actuator: GainLimits | None = None
@@ -413,7 +413,7 @@ class Trajectory(ByAgent, ByValue, Shown):
 
     @property
     def vehicles(self) -> bool:
-        """Whether these are double integrators that track the agents of another run."""
+        """Whether these are vehicles that track the agents of another run."""
         return self.conditions.tracking is not None
 
     @property

@@ -127,7 +127,7 @@ def test_no_run_of_a_graph_exceeds_a_bound(name: str):
         runs = [simulate_late(graph, PROTOCOL, late.messages, x0, pattern=one) for one in ("oldest", "square")]
     ends = np.asarray(made.final_state, dtype=float)[:, None]
     for run in runs:
-        moved = run if late.vehicles is None else follow(run, late.tracking_protocol, late.vehicles.v0)
+        moved = run if late.vehicles is None else follow(run, late.tracking_protocol, late.vehicles.vehicles)
         before, up_to_T = moved.t < 0.999, moved.remaining > 0
         off, at_T = np.abs(moved.states - ends), int(np.argmax(moved.remaining == 0))
         if late.vehicles is None:
@@ -389,13 +389,13 @@ def false_claims(data: Json) -> list[str]:
         v0, g0 = np.abs(by_agent(data, told["v0"])), float(number(data["problem"]["gain"]["rho1"])) + k
         if b >= a1 or b > a2:
             continue
-        lag, c = 1 / (a1 - b), a1 / k + a1 * a1
+        lag, c = 1 / (a1 - b), max(a1 * a1, a1 / k - a1 * a1)
         offer("position", a1 * lag * one["away"] * left + one["floor"] + v0 * lag * left / g0)
         if whole and capped:
             p, n = one["falling"], one["standing"]
             offer("velocity", largest(v0 * (1 + a1 * lag) / g0 + a1 * lag * p, b, data) + cap * n)
             push = largest(v0 * (c * lag + a1 + a2) / g0 + (c * lag + a1) * p, b, data, 2)
-            offer("push", push + (1 / k + 2 * a1) * cap**2 * n)
+            offer("push", push + (c / a1 + a1) * cap**2 * n)
     claims = {key: said[key] for key in ("residual", "input") if key in said}
     claims |= {
         {"input": "push"}.get(key, key): told[key] for key in ("position", "velocity", "input") if told and key in told

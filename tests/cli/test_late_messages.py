@@ -809,6 +809,35 @@ def test_vehicles_that_exchange_virtual_positions_are_certified_checked_drawn_an
     assert family.code == 0 and "for every signal, of virtual positions" in " ".join(family.out.split())
 
 
+def test_a_mixed_team_is_certified_checked_and_run_and_what_it_cannot_be_is_refused():
+    Path("orders.csv").write_text("node,order\na,1\nb,2\nc,3\nd,1\n")
+    team = (*START, "--orders", "orders.csv", "--v0", "0,2,-1,0", "--a0", "0,0,4,0", "--gain-cap", "20")
+    said = ptcc("certify", "team.csv", *QUICK, *team, "--delay", "0.01", "-o", "c.json")
+    text = " ".join(said.out.split())
+    assert said.code == 0 and "2 single, 1 double, 1 triple integrators exchange virtual positions" in text
+    assert "v(0) given, a(0) given" in text and re.search(r"a_1 = [\d.]+, a_2 = [\d.]+, a_3 = [\d.]+ messages", text)
+    assert ptcc("check", "c.json").code == 0
+    assert ptcc("report", "c.json", "-o", "c.html").code == 0
+    assert "Agent k is of order 1, 2 or 3" in Path("c.html").read_text()
+    assert ptcc("report", "c.json", "-o", "c.tex").code == 0
+    paper = Path("c.tex").read_text()
+    assert "be of order $n_{k}$, $x_{k}^{(n_{k})} = u_{k}$" in paper and r"\text{order } 3" in paper
+    assert r"$n_{k}$ & $\dot x_{k}(0)$ & $\ddot x_{k}(0)$" in paper
+    run = ptcc("simulate", "team.csv", "--rho2", "4", "--kappa", "1", *team)
+    assert run.out.startswith("t,remaining,a,b,c,d,v(a),v(b),v(c),v(d),a(a)")
+    cells = run.out.splitlines()[1].split(",")
+    assert cells[10:14] == ["nan", cells[15], "4.0", "nan"]  # the input of order 2 is its acceleration
+    for wrong, why in (
+        (("--orders", "a=1,b=2,c=4,d=1"), "--orders: of c is 4; give a whole number from 1 to 3"),
+        (("--orders", "orders.csv", "--v0", "1,0,0,0"), "--v0: of a is not 0, an agent of order 1"),
+        (("--orders", "orders.csv", "--a0", "0,1,0,0"), "--a0: of b is not 0, an agent of order 2"),
+        (("--orders", "orders.csv", "--exchange", "states"), "give --exchange virtual"),
+        (("--agents", "1", "--exchange", "virtual"), "single integrators exchange their positions as they are"),
+    ):
+        said = ptcc("certify", "team.csv", *QUICK, *START, *wrong)
+        assert said.code == 2 and why in said.err, said.err
+
+
 @pytest.mark.few(0)
 def test_the_page_of_vehicles_that_hear_at_once_draws_them_with_leaders_that_move():
     asked = (*QUICK, *START, *VEHICLES, "--leader-speed", "0.5", "--gain-cap", "20")

@@ -87,7 +87,7 @@ class LateBounds:
         The age up to which no more is left than was asked, near to the longest one that is proved; all times of
         ``messages`` in proportion.
     vehicles : VehicleBounds or None
-        What follows of double integrators that track these agents, which then are virtual.
+        What follows of vehicles that track these agents, which then are virtual.
     """
 
     case: LateCase
@@ -332,7 +332,9 @@ class LateBounds:
         """The protocol of vehicles that are bounded; None without them."""
         if self.vehicles is None:
             return None
-        return TrackingProtocol(self.gain.gain, self.vehicles.a1, self.vehicles.a2, self.messages.gain_cap)
+        return TrackingProtocol(
+            self.gain.gain, self.vehicles.gains, self.messages.gain_cap, self.vehicles.vehicles.team
+        )
 
     @property
     def direct(self) -> bool:
@@ -378,7 +380,7 @@ class LateBounds:
         """
         assert self.vehicles is not None
         position, velocity = self.vehicles.over_time(self.case, [*self.rows, *self.of_all], t)
-        if self.steps is not None and self.vehicles.input is not None:
+        if self.steps is not None and self.vehicles.by_steps:
             before = t <= float(self.case.protocol.T)
             steps = np.searchsorted([float(x) for x in self.steps.instants[1:-1]], t[before] * (1 - 1e-15))
             own = np.full(position.shape, np.inf)
@@ -539,7 +541,7 @@ def read_late(
     if section is None:
         return None
     vehicles = read_vehicles(section.vehicles)
-    messages = read_messages(section, structure, None if vehicles is None else Vehicles(vehicles.v0))
+    messages = read_messages(section, structure, None if vehicles is None else vehicles.vehicles)
     proved, case, rows = report.proved, LateCase(structure, protocol, messages), []
     for i, row in enumerate(section.rows):
         step = proved["late-rows", f"messages.rows[{i}]"]

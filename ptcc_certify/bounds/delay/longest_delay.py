@@ -16,9 +16,9 @@ from ptcc_certify.bounds.delay.decay_by_rows import MORE
 from ptcc_certify.bounds.delay.delay_lmi import DelayLMIBounds
 from ptcc_certify.bounds.delay.followers_of_groups import SettlingBounds
 from ptcc_certify.bounds.delay.forms_of_families import forms_of_family, longest_delay_of_family, rest_of
-from ptcc_certify.bounds.delay.late_messages import LateBounds, bound_late
+from ptcc_certify.bounds.delay.late_messages import LateBounds, bound_late, late_rows
 from ptcc_certify.bounds.delay.small_delays import SmallDelayBounds
-from ptcc_certify.bounds.virtual_positions import vehicles_of_all
+from ptcc_certify.bounds.virtual_positions import bound_vehicles
 from ptcc_certify.checker.forms_of_families import SpreadingFunction
 from ptcc_certify.checker.stated_bounds import DecayOfAll
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
@@ -80,8 +80,9 @@ def _with_decays(late: LateBounds, decays: Sequence[DecayOfAll]) -> LateBounds:
         least = [x for x in (late.input, *map(late.case.inputs, decays)) if x is not None]
         bound = np.minimum.reduce(least) if least else None
         late = replace(late, input=None if bound is None or np.isinf(bound).any() else bound)
-    if late.messages.vehicles is not None and late.vehicles is None and decays:
-        late = replace(late, vehicles=vehicles_of_all(late.case, decays))
+    if late.messages.vehicles is not None and decays:
+        rows = late_rows(late.case) if late.rows else None
+        late = replace(late, vehicles=bound_vehicles(late.case, late.rows, rows, late.steps, decays))
     return late
 
 

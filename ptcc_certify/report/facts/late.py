@@ -90,13 +90,19 @@ def _vehicles(certificate: Certificate, late: LateBounds) -> Facts:
     """Tell what vehicles do that exchange virtual positions, and what is proved of their motion before ``T``."""
     if late.messages.vehicles is None:
         return
-    text = "double integrators exchange virtual positions z_k, z_k' = gain e_k"
+    orders = late.messages.vehicles.orders
+    names = {1: "single", 2: "double", 3: "triple"}
+    mixed = [f"{orders.count(n)} {names[n]}" for n in sorted(set(orders))]
+    who = names[orders[0]] if len(mixed) == 1 else ", ".join(mixed)
+    text = f"{who} integrators exchange virtual positions z_k, z_k' = gain e_k"
     if (proved := late.vehicles) is None:
         yield Fact(head="agents", note=text)
         return
     places = "" if certificate.proof.offsets is None else ", places added"
-    gains = "a_1 = a_2" if proved.a1 == proved.a2 else f"a_1 = {near(proved.a1)}, a_2"
-    yield Fact(head="agents", note=f"{text}, and track them{places}: {gains} = {near(proved.a2)}")
+    named = [f"a_{i} = " for i, a in enumerate(proved.gains, start=1)]
+    told = zip(named, proved.gains, strict=True) if len(set(proved.gains)) > 1 else [("".join(named), proved.gains[0])]
+    gains = ", ".join(f"{name}{near(a)}" for name, a in told)
+    yield Fact(head="agents", note=f"{text}, and track them{places}: {gains}")
     shares, percent = (0.5, 0.9, 0.99), np.arange(1, 100)  # drives are summed up from instant to instant
     over_time = late.vehicles_over_time(float(late.gain.gain.T) * percent / 100)
     position, velocity = (bounds[:, np.isin(percent, (50, 90, 99))] for bounds in over_time)

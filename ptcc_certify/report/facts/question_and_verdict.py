@@ -48,8 +48,9 @@ def _beginning(certificate: Certificate, origins: Mapping[str, str]) -> list[str
         for i, name in enumerate(("x(0)", "v(0)", "a(0)")[: certificate.proof.agents.order]):
             still = i > 0 and not any(chain[i] for agent in states for chain in agent)
             begin.append(f"{name} {origins.get(name, '0' if still else 'given')}")
-    if (v0 := certificate.proof.velocities) is not None:
-        begin.append(f"v(0) {origins.get('v(0)', 'given' if any(v0) else '0')}")
+    for name, values in (certificate.proof.vehicles or {}).items():
+        if name != "order":
+            begin.append(f"{name} {origins.get(name, 'given' if any(values) else '0')}")
     if certificate.initial_set is not None and (not begin or certificate.only_drawn):
         begin = [initial_states_text(_set_of_positions(certificate.initial_set, certificate.proof.offsets))]
     begin += ["in a formation"] if certificate.proof.offsets is not None else []

@@ -46,9 +46,10 @@ def initial_facts(certificate: Certificate, origins: Mapping[str, str], alone: b
     if (places := certificate.proof.offsets) is not None:
         values = dict(zip(certificate.labels, places, strict=True))
         yield Fact(head="offsets", value=values, note=value_list(certificate.labels, places), detail=True)
-    if (v0 := certificate.proof.velocities) is not None and any(v0):
-        values = dict(zip(certificate.labels, v0, strict=True))
-        yield Fact(head="v(0)", value=values, note=value_list(certificate.labels, v0), detail=True)
+    for name, column in (certificate.proof.vehicles or {}).items():
+        if any(column):
+            values = dict(zip(certificate.labels, column, strict=True))
+            yield Fact(head=name, value=values, note=value_list(certificate.labels, column), detail=True)
 
 
 def final_facts(certificate: Certificate) -> Facts:

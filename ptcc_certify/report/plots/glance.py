@@ -435,5 +435,5 @@ def _draw_run(ax: Axes, certificate: Certificate, run: Any, ends: np.ndarray, ti
     name_agents(ax, run, values, named, ends=True, until=_LAST * T, told=ends)
     draw_deadlines(ax, run, told=True)
     part = certificate.proof.agents
-    name = "state $x_k$" if part is None and certificate.proof.velocities is None else "position"
+    name = "state $x_k$" if part is None and certificate.proof.vehicles is None else "position"
     finished(ax, time_label("time $t$", time_unit), f"{name}, coordinate 1" if part and part.dimension > 1 else name)

@@ -53,7 +53,7 @@ def agents_run(subject: Any) -> AgentsTrajectory:
         return subject.simulate()
     if isinstance(subject, AgentsTrajectory):
         return subject
-    if isinstance(subject, Certificate) and subject.proof.velocities is not None:
+    if isinstance(subject, Certificate) and subject.proof.vehicles is not None:
         raise ParameterError(
             "this figure is not drawn yet of vehicles that exchange virtual positions; take states, late or input"
         )
