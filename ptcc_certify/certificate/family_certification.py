@@ -5,6 +5,7 @@ A family of one mode with known weights is a graph, and :func:`ptcc_certify.cert
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -37,6 +38,7 @@ from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
 from ptcc_certify.lyapunov.common_form_search import CLOSED_ROWS, FULL_ROWS, CommonFormSearch, search_common_forms
 from ptcc_certify.lyapunov.common_forms import CommonForm
 from ptcc_certify.lyapunov.follower_function import follower_functions
+from ptcc_certify.lyapunov.follower_rows import leading_group
 from ptcc_certify.lyapunov.forms_for_one_state import Aim, aimed_functions
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.slow_signals import prove_signal_rate_bound
@@ -52,6 +54,8 @@ STEPS = ("the decision", "upper bound on the decay rate", "Lyapunov functions", 
 BOXES = "boxes of followers"
 #: Share of the upper bound that ends the search, and share of the time that the bound may take at first.
 _ENOUGH, _BOUND_SHARE = Fraction(99, 100), 0.3
+#: The same share where what is asked rests on rows, and seconds of work that forms may take then.
+_NEARLY, _BESIDE_ROWS = Fraction(9, 10), 8.0
 #: Agents and edges of a component up to which ends are told between which each agent stays.
 _MANY = 200_000
 
@@ -101,9 +105,10 @@ def certify_family(
     parts, notes = [], list(family.notes)
     still = not any(question.sigma0 or ())
     begin = question.initial_state if still else None
+    by_rows = request.messages is not None and leading_group(family) is None
     with deadline.time_limit(request.time_limit, work=request.by_work):
         for component in components:
-            part = _prove(component, notes, progress, question.protocol, begin)
+            part = _prove(component, notes, progress, question.protocol, None if by_rows else begin, by_rows)
             parts.append(part if begin is None else _with_means(part))
         if request.signal != "any":
             progress(STEP)
@@ -217,7 +222,9 @@ def _prove(
     progress: Callable[[str], None],
     protocol: Protocol,
     state: Sequence[Fraction] | None,
+    by_rows: bool = False,
 ) -> ComponentProof:
+    """Prove what every signal does; ``by_rows`` if what is asked rests on these, and forms tell the rate besides."""
     bare = ComponentProof(component)
     if component.kernel is None or component.nodes.size == 1 or not bare.certifiable:
         return bare
@@ -238,15 +245,16 @@ def _prove(
     squares: list[SquaresFunction] = []
     aimed: list[ProvedFunction] = []
     aim = None if state is None else _aim(quotient, protocol, [state[v] for v in component.nodes.tolist()])
-    with share_of_time(1.0, STEPS[2], notes):
+    seconds = _BESIDE_ROWS if by_rows else math.inf
+    with share_of_time(1.0, STEPS[2], notes), deadline.time_limit(seconds, work=True):
         squares = _squares(component)  # which takes no time to speak of
-        enough = None if bound is None else _ENOUGH * bound.value
-        search = search_common_forms(quotient, enough=enough, slower=aim is None)
+        enough = None if bound is None else (_NEARLY if by_rows else _ENOUGH) * bound.value
+        search = search_common_forms(quotient, enough=enough, slower=aim is None and not by_rows)
         for V in () if aim is None else aimed_functions(quotient, aim, search.functions, notes):
             aimed.append(V)  # kept, whatever comes after
     notes += [*search.notes, *(f"{name}: cut off by the time limit" for name in search.cut_off)]
     rate = max((V.rate for V in search.functions), default=Fraction(0))
-    if bound is not None and search.functions and rate < _ENOUGH * bound.value:
+    if bound is not None and search.functions and rate < _ENOUGH * bound.value and not by_rows:
         with share_of_time(1.0, STEPS[1], notes):  # signals played against what was found
             again = prove_signal_rate_bound(quotient, search.functions)
             bound = bound if again is None else min(bound, again, key=lambda b: b.value)

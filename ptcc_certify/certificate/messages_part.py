@@ -44,7 +44,7 @@ def with_messages(certificate: Certificate) -> Certificate:
         return certificate.changed(late=late)
     case = replace(late.case, influence=proof.influence, forms=proof.decaying_forms)
     late = with_forms(replace(late, case=case))
-    if messages.age:
+    if messages.age and not late.rows:  # which bear any delay
         late = replace(late, longest_delay=longest_forgiven(case))
     certificate, asked = certificate.changed(late=late), certificate.expectations.max_residual
     if asked is not None and messages.age and proof.graph.n_nodes <= EXACT_NODES:
