@@ -129,7 +129,9 @@ def test_a_first_row_without_a_weight_may_be_a_header():
         Path("said.csv").write_text(f"listener,speaker\n{rows}")
         run = ptcc("classify", "said.csv")
         assert run.code == 2 and len(run.err.splitlines()) == 1
-        assert run.err.endswith("if this row is a header, name its columns source, target, weight\n")
+        assert run.err.endswith(
+            "if this row is a header, call who is heard source, who listens target, and the weight weight\n"
+        )
 
 
 # ---------------------------------------------------------------------- wrong kinds of file
