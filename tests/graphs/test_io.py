@@ -1374,6 +1374,8 @@ def test_where_the_title_of_a_told_source_says_that_it_listens_a_note_asks(colum
         assert asks not in read_graph(io.StringIO(table), orientation=told, columns=columns).read["notes"]
     swapped = read_graph(io.StringIO(table), columns="speaker,listener,w")
     assert not any("listens" in note for note in swapped.read["notes"])
+    with pytest.raises(FormatError, match=r"listener listens to speaker, edges the opposite; .* listener,speaker,w"):
+        read_graph(io.StringIO(table), orientation="listens", columns="speaker,listener,w")
 
 
 def test_a_header_of_two_columns_may_call_the_values_anything(tmp_path):

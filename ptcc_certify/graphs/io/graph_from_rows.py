@@ -192,7 +192,7 @@ class _Draft:
 
     def columns_mend(self) -> str:
         if not self.name:
-            return "write 1 and -1, or name the weight: weight=, of a table columns="
+            return "write 1 and -1, or name the weight: as_graph(.., weight=...)"
         tell = ", or name the columns of source, target and weight: --columns a,b,w"
         return f"write 1 and -1{tell if self.rows.beside.may_be_told else ''}"
 

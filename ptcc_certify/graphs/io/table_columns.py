@@ -229,6 +229,11 @@ def _told(titles: tuple[str, ...], others: Sequence[Sequence[str]], place: str, 
     if not by_title and edge_columns(titles, place) is None and not _is_header(titles, at[2], others, place):
         return Columns(at[0], at[1], at[2], told=True, notes=(_note(how.titles, 0, 1, 2),))
     notes, ends = [_note(titles, *at)], (titles[at[0]], titles[at[1]])
+    opposite = re.match(_HEARD, plain(ends[0])) and re.match(_LISTENERS, plain(ends[1]))
+    if by_title and opposite and how.orientation == "listens":
+        heard, listens = map(shorten, ends)
+        mend = f'leave "listens" out, or give the columns {listens},{heard},{shorten(titles[at[2]])}'
+        raise FormatError(f"{place}: the columns say that {listens} listens to {heard}, edges the opposite; {mend}")
     if _turned(*ends):
         notes.append(f"{' listens to '.join(map(shorten, ends))}{LISTENS}")
     return Columns(at[0], at[1], at[2], titles=titles, told=True, notes=tuple(notes))
