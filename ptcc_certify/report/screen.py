@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ptcc_certify.certificate.fact import Fact
 from ptcc_certify.checker.family import THEOREM
+from ptcc_certify.checker.structure import reference
 from ptcc_certify.errors import PTCCError, Spelling, spell
 from ptcc_certify.report.facts.claim import WHATEVER
 from ptcc_certify.report.text_layout import TEXT, columns, format_lines, wrap_lines
@@ -159,19 +160,19 @@ def check_summary(path: str, document: Mapping[str, Any], report: CheckReport) -
     return wrap_lines([*lines, report.lines()[-1]])
 
 
-def _file_claims(document: Mapping[str, Any]) -> list[Mapping[str, str]]:
+def _file_claims(document: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """Return the claims of a file: of many components their parts stand in arrays."""
     components = document.get("components", [document])
     if isinstance(components, list):
         return [part["claim"] for part in components]
-    pairs = zip(components["theorem"], components["behaviour"], strict=True)
-    return [{"theorem": theorem, "behaviour": behaviour} for theorem, behaviour in pairs]
+    keys = "theorem", "behaviour", "corollaries"
+    return [dict(zip(keys, claim, strict=True)) for claim in zip(*(components[key] for key in keys), strict=True)]
 
 
-def _file_claim(claim: Mapping[str, str]) -> str:
+def _file_claim(claim: Mapping[str, Any]) -> str:
     """Tell a claim of a file in a few words."""
     if claim["theorem"] != THEOREM:
-        return f"{claim['behaviour']} (Theorem {claim['theorem']})"
+        return f"{claim['behaviour']} ({reference(claim['theorem'], claim['corollaries'])})"
     return claim["behaviour"] if claim["behaviour"] == DEPENDS else f"{claim['behaviour']} {WHATEVER['any']}"
 
 

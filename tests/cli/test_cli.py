@@ -392,7 +392,7 @@ def test_check_tells_the_claims_of_many_components(folder: Path):
     told = ptcc("check", "many.json", "many.csv")
     assert (told.code, told.err) == (4, "") and "... 102 components in all" in told.out
     lines = check_summary("", json.loads(Path("many.json").read_text()), check("many.json"))
-    claim = "interval bipartite consensus (Theorem 2.1), stability (Theorem 1.2) in 102 components"
+    claim = "interval bipartite consensus (Theorem 2.1, Corollary 4), stability (Theorem 1.2) in 102 components"
     assert claim in " ".join(map(str.strip, lines))
 
 
