@@ -4,7 +4,9 @@ Each class inherits :class:`PTCCError` and the built-in exception that fits, so 
 A message is one line: what is wrong, where, and how to mend it.
 """
 
+import csv
 import inspect
+import re
 import traceback
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -105,6 +107,23 @@ def quoted(label: str) -> str:
     "Smith, J", ann lee
     """
     return f'"{label}"' if "," in label or label != label.strip(" ") else label
+
+
+def items_of(text: str) -> list[str]:
+    """Return what commas separate: labels, or ``label=value``, where quotes may stand around the label or all of it.
+
+    Raises
+    ------
+    csv.Error
+        A quote is not closed.
+
+    Examples
+    --------
+    >>> items_of('bob=1, "Smith, J"=2'), items_of('"Smith, J=2","ann lee"')
+    (['bob=1', 'Smith, J=2'], ['Smith, J=2', 'ann lee'])
+    """
+    text = re.sub(r'(^|,)\s*"((?:[^"]|"")*)"\s*=([^,"]*)', r'\1"\2=\3"', text)
+    return next(csv.reader([text], skipinitialspace=True, strict=True), [])
 
 
 def unlabelled(text: str) -> str:

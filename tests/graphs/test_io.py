@@ -1210,10 +1210,12 @@ def test_a_wrong_initial_state_is_refused(content, words):
         assert word in message
 
 
-def test_an_initial_state_of_labels_with_commas_is_sent_to_a_file():
+def test_labels_with_commas_stand_in_quotes():
     cars = SignedDigraph.from_edges([("my car", "your, car", 1)])
-    with pytest.raises(ParameterError, match='"your" is not label=value; for labels with a comma give a CSV file'):
+    with pytest.raises(ParameterError, match='"your" is not label=value; write labels with a comma in quotes'):
         read_state("my car=1,your, car=2", cars)
+    for text in ('my car=1,"your, car"=2', '"your, car"=2, "my car" = 1', 'my car=1,"your, car=2"'):
+        assert read_state(text, cars) == [1, 2]
 
 
 @pytest.mark.parametrize(

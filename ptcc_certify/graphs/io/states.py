@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.decimal_rounding import counted
-from ptcc_certify.errors import FormatError, NumberError, ParameterError, PTCCError, did_you_mean
+from ptcc_certify.errors import FormatError, NumberError, ParameterError, PTCCError, did_you_mean, items_of
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io.conversion import as_graph
 from ptcc_certify.graphs.io.decimal_commas import pointed
@@ -143,8 +143,8 @@ def read_state(
     Parameters
     ----------
     text_or_path : str or Path
-        Numbers in node order ``5,2,-4``; or ``label=value`` in any order, an item with a comma in its label quoted
-        whole (``"a,b=1"``); or the path of a file with rows ``node,value`` (header optional, separators, comments
+        Numbers in node order ``5,2,-4``; or ``label=value`` in any order, a label with a comma in quotes
+        (``"a,b"=1``); or the path of a file with rows ``node,value`` (header optional, separators, comments
         and quotes as in an edge list).
     graph : SignedDigraph
     name : str
@@ -172,7 +172,7 @@ def read_state(
         return _state_of_file(text_or_path, graph)
     place = f'{name} "{shorten(text_or_path)}"'
     try:
-        items = next(csv.reader([text_or_path], skipinitialspace=True, strict=True)) or [""]
+        items = items_of(text_or_path) or [""]
     except csv.Error as error:
         raise ParameterError(place, f"unclear quotes ({error}); close each") from None
     bare, labelled = text_or_path.strip(), any("=" in item for item in items)
@@ -183,7 +183,7 @@ def read_state(
         if (other := next((item for item in items if "=" not in item), None)) is not None:
             message = f'"{shorten(other)}" is not label=value'
             if any("," in label for label in graph.labels):
-                message += "; for labels with a comma give a CSV file with rows node,value"
+                message += "; write labels with a comma in quotes"
             raise ParameterError(place, message)
         pairs = [item.rpartition("=")[::2] for item in items]
         pairs = [(label if label in graph.index else label.strip(), value) for label, value in pairs]
