@@ -417,7 +417,7 @@ def edge_list(graph: SignedDigraph, name: str) -> bytes:
     declared = np.ones(graph.n_nodes, dtype=bool)
     if ordered_labels(list(graph.labels[::-1]))[0] == list(graph.labels):  # the labels themselves tell their order
         declared[graph.source] = declared[graph.target] = False
-    lines = ["source,target,weight", *(labels[k] for k in np.flatnonzero(declared))]
+    lines = ["source,target,weight", *(f"{labels[k]},," for k in np.flatnonzero(declared))]
     for s, t, weight in zip(graph.source.tolist(), graph.target.tolist(), graph.weight_texts, strict=True):
         lines.append(f"{labels[s]},{labels[t]},{weight}")
     return "".join(f"{line}\n" for line in lines).encode("utf-8")

@@ -274,8 +274,8 @@ def reading_flags(read: Mapping[str, Any]) -> str:
 def write_graph(graph: SignedDigraph, path: str | os.PathLike[str]) -> None:
     """Write a graph as CSV ``source,target,weight`` that :func:`read_graph` reads back as an equal graph.
 
-    Weights are written as ``p`` or ``p/q``. Rows with one field declare isolated nodes, or all nodes where these are
-    not in the order of their numbers.
+    Weights are written as ``p`` or ``p/q``. Rows ``node,,`` declare isolated nodes, or all nodes where these are not
+    in the order of their numbers.
 
     Parameters
     ----------
