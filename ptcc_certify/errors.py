@@ -4,7 +4,9 @@ Each class inherits :class:`PTCCError` and the built-in exception that fits, so 
 A message is one line: what is wrong, where, and how to mend it.
 """
 
+import csv
 import inspect
+import re
 import traceback
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -105,6 +107,23 @@ def quoted(label: str) -> str:
     "Smith, J", ann lee
     """
     return f'"{label}"' if "," in label or label != label.strip(" ") else label
+
+
+def items_of(text: str) -> list[str]:
+    """Return what commas separate: labels, or ``label=value``, where quotes may stand around the label or all of it.
+
+    Raises
+    ------
+    csv.Error
+        A quote is not closed.
+
+    Examples
+    --------
+    >>> items_of('bob=1, "Smith, J"=2'), items_of('"Smith, J=2","ann lee"')
+    (['bob=1', 'Smith, J=2'], ['Smith, J=2', 'ann lee'])
+    """
+    text = re.sub(r'(^|,)\s*"((?:[^"]|"")*)"\s*=([^,"]*)', r'\1"\2=\3"', text)
+    return next(csv.reader([text], skipinitialspace=True, strict=True), [])
 
 
 def unlabelled(text: str) -> str:
@@ -316,12 +335,13 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
 #: Where a keyword belongs that a function does not have.
 _PLACES = dict.fromkeys(("T", "rho1", "rho2", "kappa"), "NominalProtocol")
 _PLACES |= dict.fromkeys(("T_r", "T_s", "mu1", "mu2", "mu3"), "SlidingModeProtocol")
-_PLACES["orientation"] = "as_graph"
+_OF_GRAPHS = ("orientation", "duplicates", "drop_self_loops", "drop_zeros", "undirected", "laplacian", "columns")
+_PLACES |= dict.fromkeys(_OF_GRAPHS, "as_graph")
 _PLACES |= dict.fromkeys(("gain_cap", "stop_before", "sample_period"), "GainLimits")
 _PLACES |= dict.fromkeys(("behaviour", "min_rate", "max_input"), "Expectations")
 _PLACES |= dict.fromkeys(("method", "at", "initial_set", "simulation", "time_limit", "expectations"), "Asks")
 _PLACES |= dict.fromkeys(("delta", "noise", "disturbance"), "Asks")
-_PLACES |= {"sigma0": "InitialState", "v0": "InitialState", "derivatives": "InitialState", "orientation": "as_graph"}
+_PLACES |= {"sigma0": "InitialState", "v0": "InitialState", "derivatives": "InitialState"}
 _PLACES |= dict.fromkeys(("delay", "own_delay", "period", "losses", "value_error"), "LateMessages")
 #: How many parameters are listed.
 _FEW = 12
@@ -383,8 +403,15 @@ def unknown_parameter(name: str, unknown: str, parameters: Iterable[str]) -> str
     parameters = list(parameters)
     listed = f"it has {', '.join(parameters)}" if len(parameters) <= _FEW else f"help({name}) lists what it has"
     hint = did_you_mean(unknown, parameters) or f"; {listed}"
-    if (place := _PLACES.get(unknown)) and name not in _PLACES.values():
-        hint = f"; give it to {place}({unknown}=...)"
+    called = "orientation" if unknown == "edges" else unknown  # as the command line calls it
+    if called != unknown and called in parameters:
+        hint = f"; it is called {called}"
+    elif (
+        (place := _PLACES.get(called))
+        and name not in _PLACES.values()
+        and (place != "as_graph" or "graph" in parameters)
+    ):
+        hint = f"; give it to {place}({called}=...)"
     return f"{name} has no parameter {unknown}{hint}"
 
 

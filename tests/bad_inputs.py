@@ -152,7 +152,7 @@ FILES = [
     _graph("weight zero", "a,b,1\nb,a,0.0\n", "neither ally nor opponent"),
     _graph("weight empty", "a,b,1\nb,a,\n", "has no weight"),
     _graph("weight a division by zero", "a,b,1/0\n", "divides by zero"),
-    _graph("weight with a decimal comma", "a;b;0,5\n", "decimals with a point"),
+    _graph("weight with a decimal comma", "a b 0,5\n", "decimals with a point"),
     _graph("weight in digits that are not ASCII", "a,b,١٢\n", "not a number"),
     _graph("weight with underscores", "a,b,1_000\n", "not a number"),
     _graph("weight 1e999999999", "a,b,1e999999999\n", "exponent"),

@@ -330,13 +330,14 @@ def _judge_late_input(proof: GraphProof | FamilyProof, late: LateBounds, most: F
     largest = largest_late_input(late, proof.protocol)
     if largest is None:
         tracked = late.leaders if late.tracks else None
-        why = f"no bound is proved {tracked.while_told if tracked is not None else f'with {late.messages.name}'}"
+        under = f"with {late.messages.name}" if tracked is None else tracked.while_told
+        why: Sentence = f"no bound is proved {under}"
         if late.messages.vehicles is not None:
             why = "no bound is proved of virtual positions without a cap"
         elif late.heard_right and not late.tracks:
             why = "not all who listen have rho2 kappa times their weights >= 1"
         elif late.messages.gain_cap is None and not late.tracks:
-            why += "; a gain without a cap makes ever more of what is left at T"
+            why = (f"{why}; a gain without a cap makes ever more of what is left at T: add ", Change("gain_cap"))
         return Answer(OPEN, what, why)
     if late.relative:
         what += f" from within 1 of the {'final states' if late.leaders is None else 'targets'}"

@@ -53,7 +53,7 @@ from ptcc_certify.checker.row_functions import check_family_functions
 from ptcc_certify.checker.section_declarations import declared
 from ptcc_certify.checker.side_files import SideFiles, beside
 from ptcc_certify.checker.signal_bounds import check_drive, check_family_bounds
-from ptcc_certify.checker.structure import MANY_COMPONENTS, StructureSection, check_claim, check_structure
+from ptcc_certify.checker.structure import MANY_COMPONENTS, StructureSection, check_claim, check_structure, reference
 from ptcc_certify.checker.theorem_function import check_paper
 
 USAGE = "usage: python -m ptcc_certify.checker CERTIFICATE|- [--stdlib] [--memory GB]"
@@ -251,7 +251,7 @@ def stated(data: Mapping[str, Any]) -> list[str]:
     >>> cert = certify([("a", "b", -1)], NominalProtocol(T=2, rho1=1), [3, 1], asks=Asks(simulation=False))
     >>> print(*stated(cert.to_dict()), sep=chr(10))
     protocol   nominal: T=2, rho1=1, rho2=1, kappa=2; 2 nodes
-    claim      interval bipartite consensus (Theorem 2.1)
+    claim      interval bipartite consensus (Theorem 2.1, Corollary 3)
     x(T)       a at 3, b at -3
     """
     problem = data["problem"]
@@ -262,9 +262,9 @@ def stated(data: Mapping[str, Any]) -> list[str]:
     signal = f", signal {problem['signal']}" if "signal" in problem else ""
     lines = [f"protocol   {gain['kind']}: {numbers}; {counted(len(nodes), 'node')}{signal}"]
     if "claim" in data:
-        theorem = data["claim"]["theorem"]
-        named = f"Theorem {theorem}" if theorem[0].isdigit() else theorem
-        lines.append(f"claim      {data['claim']['behaviour']} ({named})")
+        claim = data["claim"]
+        cited = reference(claim["theorem"], claim.get("corollaries", ()))
+        lines.append(f"claim      {claim['behaviour']} ({cited})")
     elif isinstance(parts := data.get("components"), list):
         told = dict.fromkeys(part["claim"]["behaviour"] for part in parts)
         lines.append(f"claim      {', '.join(told)}, component by component ({len(parts)})")

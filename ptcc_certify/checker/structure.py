@@ -245,6 +245,19 @@ def check_claim(doc: Document, structure: Structure, sliding: bool) -> Claim:
     return verified
 
 
+def reference(theorem: str, corollaries: Sequence[str] = ()) -> str:
+    """Return a theorem as it is cited, with the last of the corollaries that make the behaviour sharper.
+
+    Examples
+    --------
+    >>> reference("2.1", ["3"]), reference("1.2", ["1.2"]), reference("families")
+    ('Theorem 2.1, Corollary 3', 'Theorem 1.2', 'families')
+    """
+    sharper = [number for number in corollaries if number not in ("1.2", "6.2")]
+    named = f"Theorem {theorem}" if theorem[0].isdigit() else theorem
+    return f"{named}, Corollary {sharper[-1]}" if sharper else named
+
+
 def _expected(structure: Structure, sliding: bool) -> list[tuple[list[int], str, ClaimSection]]:
     """Return nodes, connectivity and claim of every weak component, by section 7 of the format."""
     piece, torn = structure.graph.pieces

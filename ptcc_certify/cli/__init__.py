@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import sys
 from typing import Any
 
@@ -48,6 +49,8 @@ _TOLD = {"why": "; the line why of classify and certify tells the counterexample
 _OF_DESIGN = {"--T": "--deadline", "--x0": "--initial-bound", "--seed": "--initial-bound"}
 #: What the deadline is called elsewhere.
 _DEADLINE = ("--deadline", "-T")
+#: What errors of what is heard are called elsewhere.
+_ERRORS = ("--error", "--errors", "--value-error", "--message-error")
 
 
 #: The commands, and what the help says of each, in this order.
@@ -78,6 +81,11 @@ GROUPS: dict[str, dict[click.Command, str]] = {
 
 class _Commands(click.Group):
     """Commands in groups, each with one plain line; near names of one that is not there."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        if args and re.fullmatch("-[vq]*h[vq]*", args[0]):  # flags of commands beside -h
+            args = ["-h"]
+        return super().parse_args(ctx, args)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return [name for group in GROUPS.values() for command in group if (name := command.name)]
@@ -110,7 +118,11 @@ class _Commands(click.Group):
                 raise click.UsageError(f"{unknown}. A file of this name is written ./{files[0]}") from None
             if ctx.invoked_subcommand == "design" and flag in _OF_DESIGN:
                 raise click.UsageError(f"{unknown}; here it is {_OF_DESIGN[flag]}") from None
-            if flag in _DEADLINE and any("--T" in p.opts for p in self.commands[ctx.invoked_subcommand or ""].params):
+            flags = {told for p in self.commands[ctx.invoked_subcommand or ""].params for told in p.opts}
+            if flag in _ERRORS and "--quantisation" in flags:
+                mend = "what is heard is rounded by --quantisation STEP, disturbed by --noise NU"
+                raise click.UsageError(f"{unknown}; {mend}") from None
+            if flag in _DEADLINE and "--T" in flags:
                 raise click.UsageError(f"{unknown}. Did you mean --T?") from None
             if not (having := [f"ptcc {name}" for name, c in others if any(flag in p.opts for p in c.params)]):
                 options = [p for p in error.possibilities or () if did_you_mean(flag.lstrip("-"), [p.lstrip("-")])]
@@ -119,6 +131,8 @@ class _Commands(click.Group):
             message = f"{unknown}. It is an option of {', '.join(having)}"
             if ctx.invoked_subcommand == "batch":
                 message += f"; of many graphs certify each: ptcc certify GRAPH {flag}"
+            elif ctx.invoked_subcommand == "design" and "ptcc certify" in having:
+                message += f"; certify the gains that are found with it: ptcc certify GRAPH {flag}"
             raise click.UsageError(message) from None
 
 

@@ -44,7 +44,8 @@ def check(
 ) -> int:
     """Check CERTIFICATE exactly, without a solver; with GRAPH, that it speaks of this graph.
 
-    Exit code 0 if the claim is proved, 1 if it is rejected, 4 if the certificate itself says undecided.
+    Exit code 0 if the claim is proved, 1 if it is rejected, 4 if the certificate itself says undecided; where what was
+    asked of it is refuted or left open, the last line, and `asked` of --json, say so.
 
     For example: ptcc check fig1b.json fig1b
 
@@ -57,7 +58,7 @@ def check(
     """
     from ptcc_certify.certificate.checking import read_and_check
     from ptcc_certify.cli.proved_checker import verified_check
-    from ptcc_certify.report.screen import check_summary
+    from ptcc_certify.report.screen import accepted_line, certificate_of_file, check_summary
     from ptcc_certify.report.text_layout import wrap_lines
 
     if certificate == "-" and "-" in graph:
@@ -76,14 +77,18 @@ def check(
     how: dict[str, str] = {}
     if graph and report.accepted:
         report, how = compare(certificate, document, report, graph, options)
+    path = "" if stdlib else certificate
     if as_json:
-        print_json(report.to_dict() | how)
+        accepted = certificate_of_file(path, document, report)
+        asked = {"asked": accepted.assessment.asked} if accepted and accepted.assessment.asked else {}
+        print_json(report.to_dict() | how | asked)
     else:
         lines = [f"graph      {text}" for text in how.values() or _own_graph(document, report)]
         if screen.verbose:
-            screen.lines(lines + report.lines())
+            last = accepted_line(report, certificate_of_file(path, document, report))
+            screen.lines([*lines, *report.lines()[:-1], last])
         elif not screen.quiet:
-            print_lines(*wrap_lines(lines), *check_summary("" if stdlib else certificate, document, report))
+            print_lines(*wrap_lines(lines), *check_summary(path, document, report))
     if not report.accepted:
         return ExitCode.VIOLATED
     return ExitCode.OK if report.verdict == "certified" else ExitCode.UNDECIDED

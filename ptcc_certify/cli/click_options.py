@@ -241,9 +241,11 @@ TOPICS = {
     "graph": TITLES["graph"],
     "families": "Families of graphs, uncertain weights, and their signals.",
     **TITLES,
+    "captured": "Agents that show what they like.",
     "files": "What is printed and written, and where the work is done.",
 }
 _TOPIC = {told.name: told.key.partition(".")[0] for told in DECLARED} | {told.name: "families" for told in OF_FAMILIES}
+_TOPIC |= dict.fromkeys(("captured", "radius"), "captured")
 
 
 def _show_help(context: click.Context, parameter: click.Parameter, topic: str | None) -> None:

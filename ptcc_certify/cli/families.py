@@ -14,7 +14,7 @@ from click.core import ParameterSource
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.click_options import SIGNAL, click_option, flag_of, options_asking, options_for, together
 from ptcc_certify.cli.terminal import Screen, print_json
-from ptcc_certify.errors import ExitCode, ParameterError, one_line
+from ptcc_certify.errors import ExitCode, ParameterError, items_of, one_line
 from ptcc_certify.graphs.declared_option import options_of
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import OPTIONAL, UNCERTAINTY
@@ -43,7 +43,7 @@ def edges_named(
     pairs = []
     for text in () if context.resilient_parsing else texts:
         try:
-            ends = [end.strip() for row in csv.reader([text], strict=True) for end in row]
+            ends = [end.strip() for end in items_of(text)]
         except csv.Error:
             ends = []
         if len(ends) != 2 or not all(ends):

@@ -13,7 +13,7 @@ import click
 from ptcc_certify.cli.click_options import Command, exact_number
 from ptcc_certify.cli.options import graph_argument, json_option, read, reading_options
 from ptcc_certify.cli.terminal import FIGURES, Screen, print_json, progress, refuse_output, screen_options
-from ptcc_certify.errors import ExitCode, ParameterError
+from ptcc_certify.errors import ExitCode, ParameterError, items_of
 from ptcc_certify.graphs.rationals import shorten
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ def _of_captured(structure: Structure, text: str, radius: str) -> Answer:
     exact = len(labels) <= EXACT_NODES
     if text != "all":
         try:
-            agents = [text] if text in labels else [x.strip() for x in next(csv.reader([text], strict=True), [""])]
+            agents = [text] if text in labels else [x.strip() for x in items_of(text)]
         except csv.Error:
             raise ParameterError(f"--captured: {shorten(text)} names no agents; write A,B, such as a,b") from None
         found = captured(structure, agents, size, exact)

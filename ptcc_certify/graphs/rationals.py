@@ -19,6 +19,9 @@ from lmi.exact.numbers import MAX_CHARACTERS, shorten
 from ptcc_certify.errors import NumberError, ParameterError
 
 Exact = Fraction | int | float | str
+#: Numbers with a decimal comma, and those of them that may have thousands instead.
+COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
+THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 #: The sign that typesetting and spreadsheets write, which is no hyphen.
 MINUS = "\N{MINUS SIGN}"
 
@@ -106,9 +109,13 @@ def decimal_mend(text: str, otherwise: str = "give a number") -> str:
     --------
     >>> decimal_mend("1,5"), decimal_mend("1,5 m"), decimal_mend("fast")
     ('write decimals with a point, 1.5', 'write decimals with a point', 'give a number')
+    >>> decimal_mend("1,500")
+    'write 1.500 or 1500'
     """
     if "," not in text:
         return otherwise
+    if THOUSANDS.fullmatch(text.strip()):
+        return f"write {text.replace(',', '.')} or {text.replace(',', '')}"
     own = f", {text.replace(',', '.')}" if re.fullmatch(r"[-+]?\d{1,20},\d{1,20}", text.strip()) else ""
     return f"write decimals with a point{own}"
 

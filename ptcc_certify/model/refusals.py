@@ -276,7 +276,10 @@ leave one of the two out
         beside |= {"leaders that move": leaders.speed, "disturbances": leaders.disturbance}
         beside |= {"a sign term": leaders.sign_gain}
         if what := next((name for name, given in beside.items() if given), None):
-            raise ParameterError("saturation", f"beside {what} is not certified yet; leave one of the two out")
+            told: tuple[str | Change, ...] = (f"beside {what} is not certified yet; leave one of the two out",)
+            if what in ("late messages", "leaders that move"):
+                told += (", or bound inputs by ", Change("gain_cap"), " and ask for ", Change("max_input"))
+            raise ParameterError("saturation", told)
     if messages is None or leaders is None:
         return
     if messages.age and leaders.growth:

@@ -8,8 +8,10 @@ from itertools import dropwhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ptcc_certify.certificate.assessment import OPEN, REFUTED
 from ptcc_certify.certificate.fact import Fact
 from ptcc_certify.checker.family import THEOREM
+from ptcc_certify.checker.structure import reference
 from ptcc_certify.errors import PTCCError, Spelling, spell
 from ptcc_certify.report.facts.claim import WHATEVER
 from ptcc_certify.report.text_layout import TEXT, columns, format_lines, wrap_lines
@@ -153,36 +155,52 @@ def check_summary(path: str, document: Mapping[str, Any], report: CheckReport) -
         texts = sorted({_file_claim(claim) for claim in claims})
         where = f" in {len(claims)} components" if len(claims) > 1 else ""
         lines = format_lines([("claim", ", ".join(texts) + where)])
-    if report.accepted and report.sections and path:
-        with suppress(PTCCError):
-            lines = short_screen(dropwhile(lambda fact: fact.head != "protocol", _file_facts(path, document, report)))
-    return wrap_lines([*lines, report.lines()[-1]])
+    certificate = certificate_of_file(path, document, report)
+    with suppress(PTCCError):
+        if certificate is not None:
+            lines = short_screen(dropwhile(lambda fact: fact.head != "protocol", _file_facts(path, certificate)))
+    return wrap_lines([*lines, accepted_line(report, certificate)])
 
 
-def _file_claims(document: Mapping[str, Any]) -> list[Mapping[str, str]]:
+def certificate_of_file(path: str, document: Mapping[str, Any], report: CheckReport) -> Certificate | None:
+    """Return an accepted certificate; None of others, without a path, and where a number is beyond float64."""
+    from ptcc_certify.certificate.certificate import accepted_certificate
+    from ptcc_certify.certificate.section_io import read_side_files
+
+    with suppress(PTCCError):
+        if report.accepted and report.sections and path:
+            files = read_side_files(document, Path(path).parent)
+            return accepted_certificate(Path(path), document, "", report, files)
+    return None
+
+
+def accepted_line(report: CheckReport, certificate: Certificate | None) -> str:
+    """Return the last line of a check, which tells too what became of what was asked where that is not met."""
+    asked = None if certificate is None else certificate.assessment.asked
+    verdict, *rest = report.lines()[-1].split("; ", 1)
+    return "; ".join([verdict, *([f"what was asked is {asked}"] if asked in (REFUTED, OPEN) else []), *rest])
+
+
+def _file_claims(document: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """Return the claims of a file: of many components their parts stand in arrays."""
     components = document.get("components", [document])
     if isinstance(components, list):
         return [part["claim"] for part in components]
-    pairs = zip(components["theorem"], components["behaviour"], strict=True)
-    return [{"theorem": theorem, "behaviour": behaviour} for theorem, behaviour in pairs]
+    keys = "theorem", "behaviour", "corollaries"
+    return [dict(zip(keys, claim, strict=True)) for claim in zip(*(components[key] for key in keys), strict=True)]
 
 
-def _file_claim(claim: Mapping[str, str]) -> str:
+def _file_claim(claim: Mapping[str, Any]) -> str:
     """Tell a claim of a file in a few words."""
     if claim["theorem"] != THEOREM:
-        return f"{claim['behaviour']} (Theorem {claim['theorem']})"
+        return f"{claim['behaviour']} ({reference(claim['theorem'], claim['corollaries'])})"
     return claim["behaviour"] if claim["behaviour"] == DEPENDS else f"{claim['behaviour']} {WHATEVER['any']}"
 
 
-def _file_facts(path: str, document: Mapping[str, Any], report: CheckReport) -> list[Fact]:
+def _file_facts(path: str, certificate: Certificate) -> list[Fact]:
     """Return the facts of an accepted certificate, as its file says it; a verdict only where something is left open."""
-    from ptcc_certify.certificate.certificate import accepted_certificate
-    from ptcc_certify.certificate.section_io import read_side_files
     from ptcc_certify.report.facts.of_certificate import facts_of
 
     origins = dict.fromkeys(("x(0)", "v(0)", "a(0)", "sigma(0)"), "as in the file")
-    files = read_side_files(document, Path(path).parent)
-    certificate = accepted_certificate(Path(path), document, "", report, files)
     facts = facts_of(certificate, path, origins, details=False)
     return [fact for fact in facts if fact.head != "verdict" or certificate.assessment.asked]

@@ -15,7 +15,8 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import counted
 from ptcc_certify.errors import FormatError, NumberError, ParameterError
-from ptcc_certify.graphs.io.edge_list import records
+from ptcc_certify.graphs.io.decimal_commas import pointed
+from ptcc_certify.graphs.io.edge_list import Records
 from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes
 from ptcc_certify.graphs.io.signs import find
 from ptcc_certify.graphs.rationals import number_within, parse_exact, shorten, whole_number
@@ -130,7 +131,8 @@ class TableSignal(Signal):
         TableSignal(2 rows over the clock)
         """
         name, _ = name_and_ending(path)
-        lines = [(k, [c.strip() for c in row]) for k, row in records(read_bytes(path, name), name) if any(row)]
+        table = Records(read_bytes(path, name), name)
+        lines = [(k, [c.strip() for c in row]) for k, row in table if any(row)]
         first = lines[0][1] if lines else []
         time, clock, mode, level = (
             find(first, names, name) for names in (("t", "time"), ("clock", "s"), ("mode",), ("level",))
@@ -139,11 +141,13 @@ class TableSignal(Signal):
         if instant is None or mode is None or (time is not None and clock is not None):
             raise FormatError(f"{name}: the header of a signal names t (or clock) and mode, and perhaps level")
         rows: list[tuple[Any, ...]] = []
-        for number, cells in lines[1:]:
-            cells = [*cells, *[""] * len(first)]
+        body = [[*cells, *[""] * len(first)] for _, cells in lines[1:]]
+        numbers = [["" if k is None else cells[k] for cells in body] for k in (instant, level)]
+        told = zip(lines[1:], body, *(pointed(texts, table.commas) for texts in numbers), strict=True)
+        for (number, _), cells, at, share in told:
             try:
-                where = float(parse_exact(cells[instant]))
-                own = () if level is None or not cells[level] else (float(parse_exact(cells[level])),)
+                where = float(parse_exact(at))
+                own = (float(parse_exact(share)),) if share else ()
             except (NumberError, OverflowError) as error:
                 raise FormatError(f"{name}, line {number}: {error}; give a number") from None
             rows.append((where, cells[mode], *own))

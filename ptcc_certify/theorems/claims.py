@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from ptcc_certify.checker.structure import reference
 from ptcc_certify.graphs.structure import (
     BIPARTITE_CONSENSUS,
     BIPARTITE_CONTAINMENT,
@@ -95,8 +96,7 @@ class Claim:
         >>> Claim("2.1", "interval bipartite consensus", ("3",), ("bipartite consensus",)).reference
         'Theorem 2.1, Corollary 3'
         """
-        corollary = f", Corollary {self.corollaries[-1]}" if self.special else ""
-        return f"Theorem {self.theorem}{corollary}"
+        return reference(self.theorem, self.corollaries)
 
     def holds(self, behaviour: str) -> bool:
         """Tell whether ``behaviour`` (words joined by blanks or hyphens) follows from this claim.

@@ -1202,7 +1202,7 @@ def test_an_accepted_certificate_tells_what_it_states(tmp_path: Path, capsys: py
     assert checker.main([str(tmp_path / "c.json")]) == 0
     *_, protocol_line, claim, states, beside, last = capsys.readouterr().out.splitlines()
     assert protocol_line == "protocol   nominal: T=1/3, rho1=1, rho2=2, kappa=1; 5 nodes"
-    assert claim == "claim      interval bipartite consensus (Theorem 2.1)" and last.startswith("accepted")
+    assert claim == "claim      interval bipartite consensus (Theorem 2.1, Corollary 3)" and last.startswith("accepted")
     assert states == "x(T)       0 at 1/7, 1 at -1/7, 2 at 1/7, 3 at -1/7, .."
     assert beside == "beside     messages: claim and x(T) are without these"
     (tmp_path / "c.json").write_text(json.dumps(data | {"verdict": "undecided"}), encoding="utf-8")

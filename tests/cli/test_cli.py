@@ -241,6 +241,17 @@ def test_a_refuted_expectation_is_3(command: str):
         assert run.err == f"{said}\n" and run.out  # the answer is printed all the same
 
 
+def test_check_of_a_refuted_question_says_so(folder: Path):
+    assert ptcc("certify", "fig1b", "--expect", "stability", "--no-simulation", "-o", "c.json").code == 3
+    for flags in ((), ("-v",)):
+        run = ptcc("check", "c.json", "fig1b", *flags)
+        assert run.code == 0 and "accepted   certified; what was asked is refuted; " in run.out
+    said = one_object(ptcc("check", "c.json", "--json").out)
+    assert (said["verdict"], said["asked"]) == ("certified", "refuted")
+    assert ptcc("certify", "fig1b", "--no-simulation", "-o", "c.json").code == 0
+    assert "asked" not in one_object(ptcc("check", "c.json", "--json").out)
+
+
 def test_check_reads_the_graph_as_its_reader_says_not_its_sender(folder: Path):
     """Orientation, repeated edges, self-loops: what only the sender said is named, and the check fails."""
     Path("g.csv").write_text("a,b,1\na,b,1\nb,c,-0.5\nc,c,1\nc,a,2\nc,d,3\n")
@@ -255,12 +266,15 @@ def test_check_reads_the_graph_as_its_reader_says_not_its_sender(folder: Path):
     for words in ((), reading[:2], reading[2:], reading[4:], ("--edges", "information", *reading[2:])):
         run = detailed("check", "c.json", "g.csv", *words)
         missing = [flag for flag in ("--edges", "--duplicates", "--drop-self-loops") if flag not in words]
-        assert run.code == 1 and run.err == "", run
-        last = run.out.splitlines()[-1]
-        assert last.startswith("rejected   graph: ") and last.endswith(" is what you mean")
+        read = "--duplicates" in words and "--drop-self-loops" in words
+        assert run.code == (1 if read else 2), run
+        last = (run.out if read else run.err).splitlines()[-1]
+        assert last.startswith("rejected   graph: " if read else "ptcc: could not read your graph ")
+        assert last.endswith(" is what you mean")
         assert all(flag in last.partition("accepted if")[2] for flag in missing)
         assert "--edges listens" in last or words[:2] == reading[:2]
-        assert one_object(ptcc("check", "c.json", "g.csv", *words, "--json").out)["accepted"] is False
+        if read:
+            assert one_object(ptcc("check", "c.json", "g.csv", *words, "--json").out)["accepted"] is False
     run = detailed("check", "c.json", "g.csv", *reading, "--duplicates", "last")
     assert run.code == 1 and run.out.splitlines()[-1].endswith("accepted if --duplicates sum is what you mean")
 
@@ -392,7 +406,7 @@ def test_check_tells_the_claims_of_many_components(folder: Path):
     told = ptcc("check", "many.json", "many.csv")
     assert (told.code, told.err) == (4, "") and "... 102 components in all" in told.out
     lines = check_summary("", json.loads(Path("many.json").read_text()), check("many.json"))
-    claim = "interval bipartite consensus (Theorem 2.1), stability (Theorem 1.2) in 102 components"
+    claim = "interval bipartite consensus (Theorem 2.1, Corollary 4), stability (Theorem 1.2) in 102 components"
     assert claim in " ".join(map(str.strip, lines))
 
 

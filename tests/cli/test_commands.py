@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import hashlib
 import json
 import os
@@ -16,6 +17,7 @@ from side_files import with_side_files
 
 import ptcc_certify
 from ptcc_certify.cli import cli
+from ptcc_certify.graphs.io import read_graph
 
 pytestmark = pytest.mark.usefixtures("quick_search")
 
@@ -119,6 +121,29 @@ def test_an_option_of_another_command_is_told_with_it():
     assert "--gain-cap: is not searched for single integrators; give it to ptcc certify, or" in capped
 
 
+def test_help_beside_other_flags_and_of_a_topic_and_of_what_errors_are_called():
+    assert ptcc("-hv").out == ptcc("--help").out
+    assert "--radius" in ptcc("influence", "--help", "captured").out
+    assert "by --quantisation STEP" in ptcc("certify", "team.csv", "--error", "0.1").err
+    design = ptcc("design", "team.csv", "--max-input", "5", "--initial-bound", "1", "--delay", "0.1").err
+    assert design.endswith("certify the gains that are found with it: ptcc certify GRAPH --delay\n")
+    both = ptcc("certify", "team.csv", "--delay", "0.01", "--saturation", "5").err
+    assert both.endswith("leave one of the two out, or bound inputs by --gain-cap and ask for --max-input\n")
+
+
+def test_a_film_is_refused_in_words_of_what_was_certified():
+    assert ptcc("certify", "team.csv", "--uncertainty", "10%", "-o", "c.json", "-q").code == 0
+    assert "certify without these, or draw a figure" in ptcc("animate", "c.json").err
+
+
+def test_nodes_without_edges_are_written_in_as_many_columns():
+    Path("g.csv").write_text('"Smith, J",b,1\nb,c,-1\n')
+    printed = ptcc("edit", "g.csv", "--without-edge", '"Smith, J",b').out
+    assert {len(row) for row in csv.reader(printed.splitlines())} == {3}
+    Path("h.csv").write_text(printed)
+    assert read_graph("h.csv").labels == ("Smith, J", "b", "c")
+
+
 def test_only_near_options_are_told():
     assert ptcc("certify", "team.csv", "--theorem", "3").err == "ptcc: No such option '--theorem'.\n"
     assert ptcc("certify", "team.csv", "--max-inputs", "3").err.endswith("Did you mean --max-input?\n")
@@ -129,7 +154,9 @@ def test_a_first_row_without_a_weight_may_be_a_header():
         Path("said.csv").write_text(f"listener,speaker\n{rows}")
         run = ptcc("classify", "said.csv")
         assert run.code == 2 and len(run.err.splitlines()) == 1
-        assert run.err.endswith("if this row is a header, name its columns source, target, weight\n")
+        assert run.err.endswith(
+            "if this row is a header, call who is heard source, who listens target, and the weight weight\n"
+        )
 
 
 # ---------------------------------------------------------------------- wrong kinds of file

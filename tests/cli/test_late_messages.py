@@ -148,7 +148,7 @@ def test_no_delay_is_told_that_the_check_does_not_accept(monkeypatch: pytest.Mon
         ),
         (
             ("--delay", "0.005", "--max-input", "1e6"),
-            "|u_k| <= 1000000 (no bound is proved with late messages; a gain without a cap",
+            "; a gain without a cap makes ever more of what is left at T: add --gain-cap)",
         ),
         (("--leader-speed", "1", "--max-input", "100"), "left open: |u_k| <= 100 (proved: "),
         (("--leader-speed", "1", "--max-input", "1"), "refuted: |u_k| <= 1 (it is up to"),

@@ -22,7 +22,10 @@ from ptcc_certify.errors import FormatError, GraphError, ParameterError
 from ptcc_certify.graphs.io import read_family, read_graph
 from ptcc_certify.graphs.io.edge_delays import read_delays
 from ptcc_certify.graphs.io.graph_files import keywords_as, reading_flags
-from ptcc_certify.graphs.reading import OPTIONS
+from ptcc_certify.graphs.io.interval_rows import read_interval_rows
+from ptcc_certify.graphs.io.states import read_state
+from ptcc_certify.graphs.reading import OPTIONS, Reading
+from ptcc_certify.simulation.switching_signals import TableSignal
 
 
 @dataclass(frozen=True)
@@ -268,9 +271,16 @@ SIGNS_BESIDE = [
     Input("g.json", '[{"source": "a", "target": "b", "weight": 2, "negative": true}]', says=('"negative"',)),
 ]
 ORDINARY = [
-    Input("g.csv", "0;1,5;-1\n1;0;2\n0;1;0\n", says=("decimal commas", "with a point")),
-    Input("g.csv", "source;target;weight\na;b;1,5\n", says=("line 2", "decimals with a point")),
-    Input("g.csv", "a;b;1,5\nb;c;-2,5\n", says=("line 1", "decimals with a point")),
+    Input("g.csv", "0;1,5;-1\n1;0;2\n0;1;0\n", "2>1=1.5 3>1=-1 1>2=1 3>2=2 2>3=1"),
+    Input("g.csv", "source;target;weight\na;b;1,5\n", "a>b=1.5"),
+    Input("g.csv", '"source";"target";"weight"\n"1,5";"b";-0,1\n', "1,5>b=-0.1"),  # as R writes it
+    Input("g.csv", "a\tb\t1,5\nb\tc\t-2,125e-1\n", "a>b=1.5 b>c=-0.2125"),
+    Input("g.csv", "source;target;weight;s\na;b;0,5;-1,0\nb;a;2;1,0\n", "a>b=-0.5 b>a=2"),
+    Input("g.csv", "a;b;1,5\n1,5;a;2\n", says=("1,5 among nodes", "quote the names")),
+    Input("g.csv", "a;b;1,500\nb;c;-2\n", says=("line 1", "write 1.500 or 1500")),
+    Input("g.csv", "a;b;0,5\nb;c;1.500\n", says=("line 1", "decimals with a point, 0.5")),
+    Input("g.csv", "a;b;0,5\nb;c;1.000,5\n", says=("line 2", '"1.000,5"', "decimals with a point")),
+    Input("g.csv", 'a,b,"0,5"\n', says=("line 1", "decimals with a point, 0.5")),
     Input("out.a", "% asym posweighted\n1 2 1 0\n2 3 5 0\n3 1 1 0\n", "1>2=1 2>3=5 3>1=1"),
     Input("out.a", "% asym signed\n1 2 1 12345\n2 3 -5 123\n3 1 1 1\n", "1>2=1 2>3=-5 3>1=1"),
     Input("out.a", "% asym signed\n1 2 0 3\n2 3 -5 0\n3 1 1 1\n4 1 1 2\n", says=("line 2", "weight 0")),
@@ -501,7 +511,8 @@ OTHERS = [
     Input("g.txt", "# FromNodeId\tToNodeId\tSign\n1\t2\t1\n2\t1\t-1\n", "1>2=1 2>1=-1"),
     Input("g.csv", "Gene1,Gene2,min,max\na,b,-1,2\n", says=("a family of graphs",)),
     Input("g.csv", "source,target,weight,max\na,b,-1,2\n", "a>b=-1"),
-    Input("m.csv", ";a;b\na;0;0,5\nb;1;0\n", says=("row a, column b of the matrix", "write decimals with a point")),
+    Input("m.csv", ";a;1,5\na;0;0,5\n1,5;1;0\n", "1,5>a=0.5 a>1,5=1"),
+    Input("m.csv", ";a;b\na;0;0,5\nb;1.5;0\n", says=("row a, column b of the matrix", "write decimals with a point")),
     Input("m.csv", ",a,b\na,0,NA\nb,1,0\n", says=("row a, column b of the matrix", '"NA" is not a number')),
     Input(
         "g.csv",
@@ -1190,7 +1201,7 @@ def test_a_certificate_tells_how_its_graph_was_read_and_the_check_reads_it_so(tm
     flags = "--edges information --duplicates last --drop-self-loops --drop-zeros --undirected --columns from,to,score"
     assert reading_flags(read) == flags
     assert run("check", str(out), str(path), *FLAGS).code in (0, 4)
-    assert run("check", str(out), str(path), *FLAGS, "--columns", "1,2,4").code == 1
+    assert run("check", str(out), str(path), *FLAGS, "--columns", "1,2,4").code == 2  # it cannot be read so
     for key, wrong in (("zeros", "dropped"), ("laplacian", "yes"), ("columns", 3), ("variable", None)):
         document = json.loads(out.read_text())
         document["problem"]["graph"]["read"][key] = wrong
@@ -1702,3 +1713,27 @@ def test_integers_of_json_that_are_names_and_positions_of_other_nodes_are_refuse
         read_graph(put(tmp_path, "g.json", named_nodes("0>1", *nodes)))
     graph = read_graph(put(tmp_path, "g.json", named_nodes("0>1", '{"name": 0}', '{"name": 1}')))
     assert told(graph) == expected("0>1=-1")
+
+
+def test_decimal_commas_beside_semicolons_are_read_wherever_a_number_stands(tmp_path):
+    edges = put(tmp_path, "e.csv", "source;target;weight;delay\na;b;0,5;0,02\nb;a;-1;0\n")
+    graph = read_graph(edges)
+    assert graph.read["notes"][:1] == ("decimal commas: 0,5 is 0.5",)
+    assert read_delays(edges, graph) == {("a", "b"): Fraction(1, 50), ("b", "a"): Fraction(0)}
+    (tmp_path / "x.csv").write_text("a;0,25\nb;-1\n")
+    assert read_state(tmp_path / "x.csv", graph) == [Fraction(1, 4), Fraction(-1)]
+    (tmp_path / "i.csv").write_text("source;target;min;max\na;b;-0,5;1,25\nb;a;1;2\n")
+    intervals = read_interval_rows(tmp_path / "i.csv", Reading(), Fraction(0))
+    assert intervals.edges[0] == ("a", "b", Fraction(-1, 2), Fraction(5, 4))
+    (tmp_path / "s.csv").write_text("t;mode\n0;day\n0,5;night\n")
+    assert TableSignal.read(tmp_path / "s.csv").rows[1][:2] == (0.5, "night")
+
+
+def test_what_is_no_weight_is_told_of_its_own_line_beside_the_question_of_the_direction(tmp_path):
+    path = put(tmp_path, "g.csv", "von;zu;gewicht\na;b;0,5\nb;c;stark\n")
+    with pytest.raises(FormatError) as told:
+        read_graph(path)
+    assert "line 1: the header von, zu, .. names no source and target (say --edges listens if von" in str(told.value)
+    assert 'line 3: weight "stark" of edge b -> c is not a number' in str(told.value)
+    with pytest.raises(FormatError, match='line 3: weight "stark" of edge c -> b is not a number'):
+        read_graph(path, orientation="listens")

@@ -187,7 +187,7 @@ def test_a_film_shows_the_run_and_ends_where_it_ends(tmp_path: Path) -> None:
     [
         ("fig3a", "run.png", 1, "films are written to"),
         ("fig3a", "run.gif", 0, "seconds = 0"),
-        ("windows", "run.gif", 1, "of one graph"),
+        ("windows", "run.gif", 1, "of intervals or modes"),
         ("core", "run.gif", 1, "at most 40 agents"),
         ("group-vehicles", "run.gif", 1, "delays are too short"),
     ],

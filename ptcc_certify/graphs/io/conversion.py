@@ -151,8 +151,9 @@ def _rows_of_table(table: Any, how: Reading) -> Rows | None:
     if not columns.titles and not columns.told:
         own = joined(names[:3]) if len(names) > 2 else "a,b,w"
         raise GraphError(
-            f"a DataFrame with the columns {first_five(names)} is no graph; name them source, target, weight, tell "
-            f'them: columns="{shorten(own)}", or give an adjacency matrix with the same labels on rows and columns'
+            f"a DataFrame with the columns {first_five(names)} is no graph; name them source, target, weight, or give "
+            f'as_graph(.., columns="{shorten(own)}"), with orientation="listens" if the first listens, or an adjacency '
+            "matrix with the same labels on rows and columns"
         )
     how.refuse("variable", "the DataFrame", "a table of edges")
     if not columns.titles:

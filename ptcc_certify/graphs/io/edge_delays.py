@@ -9,7 +9,8 @@ from itertools import chain, islice
 from ptcc_certify.errors import FormatError, NumberError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, pairs_of
-from ptcc_certify.graphs.io.edge_list import records
+from ptcc_certify.graphs.io.decimal_commas import pointed
+from ptcc_certify.graphs.io.edge_list import Records
 from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes
 from ptcc_certify.graphs.io.problems import Problem, Problems, one_message
 from ptcc_certify.graphs.io.signs import find, interval_columns, weight_and_sign
@@ -47,7 +48,7 @@ def read_delays(path: Source, graph: SignedDigraph | Family, title: str = "delay
     {('a', 'b'): Fraction(1, 50)}
     """
     name, _ = name_and_ending(path)
-    rows = records(read_bytes(path, name), name)
+    rows = Records(read_bytes(path, name), name)
     begin = list(islice((row for row in rows if len(row[1]) > 1), 20))
     number, fields = begin[0] if begin else (1, [])
     place, titles = f"{name}, line {number}", [field.strip() for field in fields]
@@ -71,15 +72,16 @@ def read_delays(path: Source, graph: SignedDigraph | Family, title: str = "delay
     first, second, _ = ends if graph.read.get("orientation") != "listens" else (ends[1], ends[0], None)
     delays: dict[tuple[str, str], Fraction] = {}
     broken = Problems()
-    known: dict[str, Fraction | None] = {}  # many edges, few delays
-    for number, row in chain(begin[1:], rows):
-        if len([field for field in row if field.strip()]) < 2:
+    body = [(number, [field.strip() for field in row]) for number, row in chain(begin[1:], rows)]
+    texts = {row[at]: None for _, row in body if at < len(row)}  # many edges, few delays
+    known = {"": None} | dict(zip(texts, map(_number, pointed(texts, rows.commas)), strict=True))
+    for number, row in body:
+        if len([field for field in row if field]) < 2:
             continue
-        source, target, text = (row[k].strip() if k < len(row) else "" for k in (first, second, at))
-        if source == target or (dropped and any(some and all(_is_zero(row, k) for k in some) for some in factors)):
+        source, target, text = (row[k] if k < len(row) else "" for k in (first, second, at))
+        zero = dropped and any(some and all(_is_zero(row, k, rows.commas) for k in some) for some in factors)
+        if source == target or zero:
             continue  # it was dropped, and its delay with it
-        if text not in known:
-            known[text] = _number(text)
         value = known[text]
         if value is None or value < 0:
             what, quote = ("negative", "") if value is not None else ("not a number", '"')
@@ -109,6 +111,6 @@ def _number(text: str) -> Fraction | None:
         return None
 
 
-def _is_zero(row: Sequence[str], column: int) -> bool:
+def _is_zero(row: Sequence[str], column: int, commas: bool) -> bool:
     """Tell whether a field is the number 0; a word for a sign is none."""
-    return column < len(row) and _number(row[column].strip()) == 0
+    return column < len(row) and _number(*pointed([row[column]], commas)) == 0

@@ -15,9 +15,10 @@ from ptcc_certify.errors import FormatError, NumberError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import comments
 from ptcc_certify.graphs.io.columns_beside import Column
+from ptcc_certify.graphs.io.decimal_commas import NOTE, pointed, pointed_fields
 from ptcc_certify.graphs.io.files import lines_of
 from ptcc_certify.graphs.io.problems import Problem, Problems, one_message
-from ptcc_certify.graphs.io.raw_edges import DECIMALS, HEADER_MEND, Beside, Draft, Numbers, Rows, Signs
+from ptcc_certify.graphs.io.raw_edges import HEADER_MEND, Beside, Draft, Numbers, Rows, Signs
 from ptcc_certify.graphs.io.signs import WEIGHT, plain, sign_of_word
 from ptcc_certify.graphs.io.table_columns import Columns, asks_of_corner, columns_of, names_edges
 from ptcc_certify.graphs.io.text_matrices import bracketed_matrix, is_entry, table_as_matrix
@@ -35,37 +36,57 @@ _TIMES = 1900
 _SECONDS = 10**8
 
 
-def records(data: bytes, name: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield number of the line and fields of each row that is not a comment; fields may have blanks around them.
+class Records(Iterator[tuple[int, list[str]]]):
+    r"""Number of the line and fields of each row that is not a comment; fields may have blanks around them.
 
     Commas, tabs, semicolons or blanks separate the fields, whichever the first row of several fields uses.
+
+    Examples
+    --------
+    >>> list(Records(b"a;b;0,5\nb", "g.csv"))
+    [(1, ['a', 'b', '0,5']), (2, ['b'])]
     """
-    numbered = enumerate(lines_of(data, name), 1)
-    separator: str | None = ","
-    detected = False
-    for number, line in numbered:
-        if number == 1 and (told := re.fullmatch(r'"?sep=([,;\t ])"?\s*', line)):  # as Excel tells it
-            separator, detected = told[1].strip(" ") or None, True
-            continue
-        if line.lstrip()[:1] in "#%":  # the empty text is in every text
-            continue
-        if not detected and not line.strip(" ,;\t"):
-            continue  # empty fields above all others
-        try:
-            if not detected:
-                separator, detected = _separator(line)
-            if '"' not in line:
-                row = line.split(separator)
-                if len(row) == 1 and _other_separator(line):
-                    mend = "separate fields as the rows before do, or quote the line if it is the name of a node"
-                    raise FormatError(f"{name}, line {number}: {shorten(line.strip())} is one field here; {mend}")
-                yield number, row
-            else:  # a quoted field may go on in the following lines
-                yield number, _csv_fields(chain([line], (text for _, text in numbered)), separator, strict=True)
-        except csv.Error as error:
-            mend = 'close each, set it apart, and write "" for a quote within quotes'
-            why = shorten(str(error), 80)
-            raise FormatError(f"{name}, line {number}: unclear quotes ({why}); {mend}") from None
+
+    def __init__(self, data: bytes, name: str):
+        self.separator: str | None = ","
+        self._rows = self._read(data, name)
+
+    def __next__(self) -> tuple[int, list[str]]:
+        return next(self._rows)
+
+    @property
+    def commas(self) -> bool:
+        """Whether a field may hold a decimal comma, by what separates the rows that were read."""
+        return self.separator in (";", "\t")
+
+    def _read(self, data: bytes, name: str) -> Iterator[tuple[int, list[str]]]:
+        numbered = enumerate(lines_of(data, name), 1)
+        separator, detected = self.separator, False
+        for number, line in numbered:
+            if number == 1 and (told := re.fullmatch(r'"?sep=([,;\t ])"?\s*', line)):  # as Excel tells it
+                self.separator = separator = told[1].strip(" ") or None
+                detected = True
+                continue
+            if line.lstrip()[:1] in "#%":  # the empty text is in every text
+                continue
+            if not detected and not line.strip(" ,;\t"):
+                continue  # empty fields above all others
+            try:
+                if not detected:
+                    separator, detected = _separator(line)
+                    self.separator = separator
+                if '"' not in line:
+                    row = line.split(separator)
+                    if len(row) == 1 and _other_separator(line):
+                        mend = "separate fields as the rows before do, or quote the line if it is the name of a node"
+                        raise FormatError(f"{name}, line {number}: {shorten(line.strip())} is one field here; {mend}")
+                    yield number, row
+                else:  # a quoted field may go on in the following lines
+                    yield number, _csv_fields(chain([line], (text for _, text in numbered)), separator, strict=True)
+            except csv.Error as error:
+                mend = 'close each, set it apart, and write "" for a quote within quotes'
+                why = shorten(str(error), 80)
+                raise FormatError(f"{name}, line {number}: unclear quotes ({why}); {mend}") from None
 
 
 def _csv_fields(lines: Iterable[str], separator: str | None, strict: bool) -> list[str]:
@@ -80,6 +101,8 @@ def _separator(line: str) -> tuple[str | None, bool]:
 
     Filled fields count first, so that ``a;b;0,5`` is split at its semicolons; then empty ones, as in ``a;;``.
     """
+    if re.fullmatch(r"[^,;]+;\s*[+-]?\d*,\d+\s*", line):  # a;0,5
+        return ";", True
 
     def rank(separator: str | None) -> tuple[int, int]:
         row = _csv_fields([line], separator, strict=False)
@@ -103,9 +126,9 @@ def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
     if not how.titles and (matrix := bracketed_matrix(data, name)) is not None:
         return matrix
     undirected = comments.undirected_by_comment(data, name)
-    numbered = records(data, name)
+    numbered = Records(data, name)
     begin = list(islice(numbered, _LOOKED_AT))
-    table = [row for _, row in begin if len(row) > 1]
+    table = _several(begin, numbered.commas)
     tells = bool(how.titles) or bool(table and names_edges(table[0]))
     konect = re.match(rb"(\xef\xbb\xbf)?%\s*(sym|asym)\b", data) is not None  # nodes, weight and time
     started = next((number for number, row in begin if len(row) > 1), 0)
@@ -113,9 +136,11 @@ def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
         table and not tells and not konect and len(table[0]) >= len(table) - 1
     ):  # perhaps a matrix, of which all rows are needed
         begin += islice(numbered, len(table[0]) + 2)
-        table = [row for _, row in begin if len(row) > 1]
+        table = _several(begin, numbered.commas)
         declares = any(len(row) == 1 and row[0].strip() for _, row in begin)
         if not declares and (matrix := table_as_matrix(table, name)) is not None:
+            if numbered.commas:
+                _name_as_written(matrix, begin)
             if (corner := table[0][0].strip()) not in matrix.labels:
                 matrix.asks = asks_of_corner(corner, f"line {started}")
             if len(table) == len(matrix.labels):  # without a row of names
@@ -125,8 +150,8 @@ def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
     if columns.titles:
         begin = [row for row in begin if row[0] != started]
     elif table:
-        _refuse_titles(table[0], f"{name}, line {started}", data)
-    draft = EdgeList(name, columns, started)
+        _refuse_titles(table[0], f"{name}, line {started}")
+    draft = EdgeList(name, columns, started, numbered.commas)
     draft.read(chain(begin, numbered))
     rows = draft.rows()
     rows.notes += comments.note_on_rows(data) or comments.note_on_directions(
@@ -142,11 +167,25 @@ def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
     return rows
 
 
+def _several(rows: Iterable[tuple[int, list[str]]], commas: bool) -> list[list[str]]:
+    """Return the rows of several fields."""
+    return pointed_fields([row for _, row in rows if len(row) > 1], commas)
+
+
+def _name_as_written(matrix: Rows, rows: Iterable[tuple[int, list[str]]]) -> None:
+    """Give the labels of a matrix back the commas that its entries lost; note that these did."""
+    fields = [field.strip() for _, row in rows for field in row]
+    written = {new: field for new, field in zip(pointed(fields), fields, strict=True) if new != field}
+    matrix.labels = [written.get(label, label) for label in matrix.labels]
+    matrix.notes += (NOTE,) if written else ()
+
+
 class EdgeList(Draft):
     """The rows of a table, as they come."""
 
-    def __init__(self, name: str, columns: Columns, started: int):
+    def __init__(self, name: str, columns: Columns, started: int, commas: bool = False):
         super().__init__()
+        self.commas, self.notes = commas, tuple[str, ...]()  # may fields hold decimal commas, and do they?
         self.name, self.columns, self.started = name, columns, started
         self.signs, self.sign_codes = Numbers(), list[int]()
         self.beside = [(k, Column(columns.titles[k])) for k in columns.ignored]
@@ -181,6 +220,18 @@ class EdgeList(Draft):
                 self.kept.append(row)
             for k, column in self.beside:
                 column.add(row[k] if k < len(row) else "")
+        if self.commas:
+            self.weights.texts, self.signs.texts, self.extra = map(
+                self.with_points, (self.weights.texts, self.signs.texts, self.extra)
+            )
+            for _, column in self.beside:
+                column.values = self.with_points(column.values)
+
+    def with_points(self, texts: dict[str, int]) -> dict[str, int]:
+        """Write a point in place of each decimal comma, and note it."""
+        result = dict(zip(pointed(texts), texts.values(), strict=True))
+        self.notes = self.notes if result == texts else (NOTE,)
+        return result
 
     def more_fields(self, number: int, row: list[str], width: int) -> bool:
         """Note fields beyond a header, which make a row none; keep those after the third of a table without."""
@@ -230,7 +281,7 @@ class EdgeList(Draft):
         """Return what was read; refuse titles that are nodes, too."""
         columns, rows = self.columns, super().rows()
         rows.headerless, rows.problems = not columns.titles, self.broken.told()
-        rows.notes, rows.asks = (*columns.notes, *self.nodes_alone()), columns.asks
+        rows.notes, rows.asks = (*columns.notes, *self.notes, *self.nodes_alone()), columns.asks
         rows.notes += ("columns ignored: after the third",) if self.extra else ()
         rows.beside = Beside(columns.codes, None, [column for _, column in self.beside], columns.told)
         if columns.sign is not None:
@@ -238,17 +289,15 @@ class EdgeList(Draft):
         ends = [columns.titles[k] for k in (columns.source, columns.target)] if columns.guessed else []
         if again := [title for title in ends if title in self.nodes.texts]:
             what = f"{shorten(again[0])} is a title, and a node in another row"
-            raise FormatError(f"{self.name}, line {self.started}: {what}; name the columns source, target, weight")
+            raise FormatError(f"{self.name}, line {self.started}: {what}; call who is heard source, who listens target")
         return rows
 
 
-def _refuse_titles(row: list[str], place: str, data: bytes) -> None:
+def _refuse_titles(row: list[str], place: str) -> None:
     """Refuse a first row that names a weight, but no source and target."""
     if plain("".join(row[2:3])) in (*WEIGHT, "sign"):
         titles = ", ".join(shorten(field.strip()) for field in row[:3])
         mend = "name the column of who is heard source, that of who listens target"
-        if re.search(rb"[;\t]\s*[+-]?\d+,\d+\s*$", data, re.MULTILINE):
-            mend += DECIMALS
         raise FormatError(f"{place}: the header {titles} names no source and target; {mend}")
 
 
@@ -368,7 +417,7 @@ def edge_list(graph: SignedDigraph, name: str) -> bytes:
     declared = np.ones(graph.n_nodes, dtype=bool)
     if ordered_labels(list(graph.labels[::-1]))[0] == list(graph.labels):  # the labels themselves tell their order
         declared[graph.source] = declared[graph.target] = False
-    lines = ["source,target,weight", *(labels[k] for k in np.flatnonzero(declared))]
+    lines = ["source,target,weight", *(f"{labels[k]},," for k in np.flatnonzero(declared))]
     for s, t, weight in zip(graph.source.tolist(), graph.target.tolist(), graph.weight_texts, strict=True):
         lines.append(f"{labels[s]},{labels[t]},{weight}")
     return "".join(f"{line}\n" for line in lines).encode("utf-8")

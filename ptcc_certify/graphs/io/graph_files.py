@@ -69,13 +69,13 @@ def read_graph(
     r"""Read a signed digraph from a file.
 
     An **edge list** has one edge ``source,target,weight`` per line. Commas, tabs, semicolons or blanks separate the
-    fields, whichever the first row uses; ``#`` and ``%`` begin comment lines; fields may be quoted; a row with one
-    field declares a node. A first row of known names (source, from, src, fromnodeid; target, to, dst, tonodeid;
-    weight, sign, rating, value, w, strength, magnitude) is a header, and columns are then found by name; so is a first
-    row such as ``Gene1,Gene2,Type`` above numbers or signs. Words for signs (``+``, ``-``, activates, inhibits, ..) are
-    1 and -1 where a column holds nothing else; a column ``sign`` or ``type`` beside ``weight`` is its factor, as is
-    another of signs beside weights that are all positive. Columns that are not read are told by
-    ``graph.read["notes"]``. A table may be a **matrix**, plain, with labels, or in brackets.
+    fields, whichever the first row uses; beside semicolons and tabs ``0,5`` is 0.5; ``#`` and ``%`` begin comment
+    lines; fields may be quoted; a row with one field declares a node. A first row of known names (source, from, src,
+    fromnodeid; target, to, dst, tonodeid; weight, sign, rating, value, w, strength, magnitude) is a header, and columns
+    are then found by name; so is a first row such as ``Gene1,Gene2,Type`` above numbers or signs. Words for signs
+    (``+``, ``-``, activates, inhibits, ..) are 1 and -1 where a column holds nothing else; a column ``sign`` or
+    ``type`` beside ``weight`` is its factor, as is another of signs beside weights that are all positive. Columns that
+    are not read are told by ``graph.read["notes"]``. A table may be a **matrix**, plain, with labels, or in brackets.
 
     **GraphML, GML, GEXF, node-link JSON** edges need an attribute ``weight`` (or ``sign``, or both), **Pajek** and
     **UCINET DL** a third column; **SIF** has rows ``a activates b c``. A **matrix** (Matrix Market, ``.npz``, ``.npy``,
@@ -274,8 +274,8 @@ def reading_flags(read: Mapping[str, Any]) -> str:
 def write_graph(graph: SignedDigraph, path: str | os.PathLike[str]) -> None:
     """Write a graph as CSV ``source,target,weight`` that :func:`read_graph` reads back as an equal graph.
 
-    Weights are written as ``p`` or ``p/q``. Rows with one field declare isolated nodes, or all nodes where these are
-    not in the order of their numbers.
+    Weights are written as ``p`` or ``p/q``. Rows ``node,,`` declare isolated nodes, or all nodes where these are not
+    in the order of their numbers.
 
     Parameters
     ----------

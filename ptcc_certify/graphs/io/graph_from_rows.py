@@ -14,7 +14,7 @@ from ptcc_certify.errors import FormatError, GraphError, NumberError
 from ptcc_certify.graphs.io.columns_beside import directions, is_signed, notes_on_ignored, verdict
 from ptcc_certify.graphs.io.laplacian_or_adjacency import Diagonal, diagonal_of, fits_one_node, is_one_half
 from ptcc_certify.graphs.io.problems import Problem, one_message
-from ptcc_certify.graphs.io.raw_edges import DECIMALS, HEADER_MEND, Rows, Signs
+from ptcc_certify.graphs.io.raw_edges import HEADER_MEND, Rows, Signs
 from ptcc_certify.graphs.io.signs import DIRECTIONS, NO_SIGN, code_among, sign_of_word
 from ptcc_certify.graphs.labels import in_all, ordered_labels, refuse_written_twice
 from ptcc_certify.graphs.packed_weights import LARGEST_WEIGHT, SMALLEST_WEIGHT, Weights
@@ -50,9 +50,12 @@ def edges_of(rows: Rows, name: str, how: Reading) -> Edges:
         label = Counter(rows.labels).most_common(1)[0][0]
         raise FormatError(f'{name}: two nodes have the label "{shorten(label)}"; rename one')
     alike = refuse_written_twice(rows.labels, name)
-    if rows.asks and how.orientation is None:
-        raise FormatError(f"{name}, {rows.asks}")
     draft = _Draft(rows, name, how)
+    if rows.asks and how.orientation is None:
+        what, _, mend = rows.asks.rpartition("; ")
+        place, _, text = what.partition(": ")
+        draft.problems = [Problem(place, text, mend), *draft.problems]
+        draft.refuse_problems()
     if not draft.no_weights:  # otherwise weights are no numbers, and say nothing of signs beside them
         draft.multiply_signs()
         draft.read_beside()
@@ -189,7 +192,7 @@ class _Draft:
 
     def columns_mend(self) -> str:
         if not self.name:
-            return "write 1 and -1, or name the weight: weight=, of a table columns="
+            return "write 1 and -1, or name the weight: as_graph(.., weight=...)"
         tell = ", or name the columns of source, target and weight: --columns a,b,w"
         return f"write 1 and -1{tell if self.rows.beside.may_be_told else ''}"
 
@@ -242,8 +245,6 @@ class _Draft:
         mend = "give one, or a word for a sign such as + - activates inhibits"
         if code == 0 and self.rows.headerless:
             mend += HEADER_MEND
-            if any("," in other for other in self.rows.weights[1:]):
-                mend += DECIMALS
         return mend
 
     def multiply_signs(self) -> None:

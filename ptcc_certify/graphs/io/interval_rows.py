@@ -12,7 +12,8 @@ from lmi.exact.decimal_rounding import counted
 from ptcc_certify.errors import FormatError, GraphError, ParameterError
 from ptcc_certify.graphs.io import comments
 from ptcc_certify.graphs.io.columns_beside import notes_on_ignored, signs_beside_intervals
-from ptcc_certify.graphs.io.edge_list import EdgeList, records
+from ptcc_certify.graphs.io.decimal_commas import pointed_fields
+from ptcc_certify.graphs.io.edge_list import EdgeList, Records
 from ptcc_certify.graphs.io.files import Source, name_and_ending
 from ptcc_certify.graphs.io.graph_files import format_of, graph_bytes, is_edge_list
 from ptcc_certify.graphs.io.interval_edges import Entry, Interval, known, told_weights
@@ -40,6 +41,7 @@ class _Table(NamedTuple):
     ends: tuple[int, int, int | None]  # columns of source, target and weight
     columns: tuple[int | None, int | None, int | None]  # of the least and the largest weight, and of what may fail
     rows: Iterator[tuple[int, list[str]]]  # but for the header
+    commas: bool  # may fields hold decimal commas?
 
 
 @dataclass
@@ -79,7 +81,7 @@ def _table(path: Source) -> _Table | None:
         path.seek(0)
     if not is_edge_list(format_of(data, ending)):
         return None
-    rows, before = records(data, name), list[tuple[int, list[str]]]()
+    rows, before = Records(data, name), list[tuple[int, list[str]]]()
     for number, row in rows:
         if len(row) > 1:
             break
@@ -94,7 +96,7 @@ def _table(path: Source) -> _Table | None:
         return None
     if columns[0] is not None and ends[2] is not None and is_sign(header[ends[2]]):
         ends = (*ends[:2], None)  # a column of signs, or of directions
-    return _Table(name, data, header, number, ends, columns, chain(before, rows))
+    return _Table(name, data, header, number, ends, columns, chain(before, rows), rows.commas)
 
 
 def read_interval_rows(path: Source, how: Reading, share: Fraction) -> IntervalRows | None:
@@ -146,7 +148,7 @@ def read_interval_rows(path: Source, how: Reading, share: Fraction) -> IntervalR
         text = str(error)
     if text:
         raise FormatError(f"{table.name}: {text}")
-    rows.notes += (*edges.nodes_alone(), *notes_on_ignored(beside), *comments.note_on_rows(table.data))
+    rows.notes += (*edges.notes, *edges.nodes_alone(), *notes_on_ignored(beside), *comments.note_on_rows(table.data))
     take(rows, entries, how, share, edges.broken)
     mended = [kind for kind, option in (("loop", how.drop_self_loops), ("zero", how.drop_zeros)) if option]
     found = edges.broken.told(*mended)
@@ -165,7 +167,7 @@ class _Edges(EdgeList):
         low = table.columns[0]
         assert weight is not None or low is not None
         columns = Columns(first, second, weight if low is None else low, titles=table.header)  # type: ignore[arg-type]
-        super().__init__(table.name, columns, table.started)
+        super().__init__(table.name, columns, table.started, table.commas)
         self.weight, self.kept = weight, list[list[str]]()
         self.ends = (*self.ends, *({table.columns[1], weight} - {None, self.ends[2]}))
         self.beside = [(k, column) for k, column in self.beside if k not in (weight, *table.columns)]
@@ -189,6 +191,10 @@ class _Edges(EdgeList):
         kept, labels = self.kept or [], [*self.nodes.texts]
         field = lambda row, k: row[k].strip() if k < len(row) else ""  # noqa: E731
         column = lambda k: [None] * len(kept) if k is None else [field(row, k) for row in kept]  # noqa: E731
+        numbers = [k for k in (*self.columns_told[:2], self.weight) if k is not None]
+        pointed = pointed_fields([[field(row, k) for k in numbers] for row in kept], self.commas)
+        for row, texts in zip(kept, pointed, strict=True):
+            row[:] = [dict(zip(numbers, texts, strict=True)).get(k, text) for k, text in enumerate(row)]
         least, largest, fails = map(column, self.columns_told)
         weights = column(self.weight)
         if self.columns_told[0] is None and self.weight is not None:

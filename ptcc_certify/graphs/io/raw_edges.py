@@ -15,9 +15,7 @@ from ptcc_certify.graphs.labels import refuse_unnamed
 from ptcc_certify.graphs.rationals import shorten
 
 #: What the first row of a table without a header may be.
-HEADER_MEND = "; if this row is a header, name its columns source, target, weight"
-#: What is said at once of a table with such a row and decimal commas.
-DECIMALS = "; write decimals with a point, such as 1.5, too"
+HEADER_MEND = "; if this row is a header, call who is heard source, who listens target, and the weight weight"
 #: The note of a file whose nodes and edges come and go.
 TIMES = "times ignored: all edges are there at once"
 

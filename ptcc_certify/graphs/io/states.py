@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.decimal_rounding import counted
-from ptcc_certify.errors import FormatError, NumberError, ParameterError, PTCCError, did_you_mean
+from ptcc_certify.errors import FormatError, NumberError, ParameterError, PTCCError, did_you_mean, items_of
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io.conversion import as_graph
-from ptcc_certify.graphs.io.edge_list import records
+from ptcc_certify.graphs.io.decimal_commas import pointed
+from ptcc_certify.graphs.io.edge_list import Records
 from ptcc_certify.graphs.io.files import name_and_ending, read_bytes
 from ptcc_certify.graphs.io.signs import find
 from ptcc_certify.graphs.labels import first_five, labels_beside
@@ -142,8 +143,8 @@ def read_state(
     Parameters
     ----------
     text_or_path : str or Path
-        Numbers in node order ``5,2,-4``; or ``label=value`` in any order, an item with a comma in its label quoted
-        whole (``"a,b=1"``); or the path of a file with rows ``node,value`` (header optional, separators, comments
+        Numbers in node order ``5,2,-4``; or ``label=value`` in any order, a label with a comma in quotes
+        (``"a,b"=1``); or the path of a file with rows ``node,value`` (header optional, separators, comments
         and quotes as in an edge list).
     graph : SignedDigraph
     name : str
@@ -171,7 +172,7 @@ def read_state(
         return _state_of_file(text_or_path, graph)
     place = f'{name} "{shorten(text_or_path)}"'
     try:
-        items = next(csv.reader([text_or_path], skipinitialspace=True, strict=True)) or [""]
+        items = items_of(text_or_path) or [""]
     except csv.Error as error:
         raise ParameterError(place, f"unclear quotes ({error}); close each") from None
     bare, labelled = text_or_path.strip(), any("=" in item for item in items)
@@ -182,7 +183,7 @@ def read_state(
         if (other := next((item for item in items if "=" not in item), None)) is not None:
             message = f'"{shorten(other)}" is not label=value'
             if any("," in label for label in graph.labels):
-                message += "; for labels with a comma give a CSV file with rows node,value"
+                message += "; write labels with a comma in quotes"
             raise ParameterError(place, message)
         pairs = [item.rpartition("=")[::2] for item in items]
         pairs = [(label if label in graph.index else label.strip(), value) for label, value in pairs]
@@ -305,11 +306,11 @@ def random_states(seed: Any, n: int, dimension: int = 1) -> list[list[Fraction]]
 def _state_of_file(path: str | os.PathLike[str], graph: SignedDigraph) -> list[Fraction]:
     name, _ = name_and_ending(path)
     columns: tuple[int, int] | None = None
-    pairs = []
-    for number, texts in records(read_bytes(path, name), name):
+    pairs, rows = [], Records(read_bytes(path, name), name)
+    for number, texts in rows:
         place, row = f"{name}, line {number}", [text.strip() for text in texts]
         if columns is None:
-            node, value = _node_and_value(row, place)
+            node, value = _node_and_value(pointed(row, rows.commas), place)
             if node is not None and value is not None:
                 columns = node, value
                 continue
@@ -319,7 +320,12 @@ def _state_of_file(path: str | os.PathLike[str], graph: SignedDigraph) -> list[F
             raise FormatError(f"{place}: a row needs a node and a value; write node,value")
         if cells:
             pairs.append((cells[0], cells[1], place))
-    return _in_node_order(pairs, graph, name, FormatError)
+    return _in_node_order(_with_points(pairs, rows.commas), graph, name, FormatError)
+
+
+def _with_points(pairs: Sequence[tuple[str, str, str]], commas: bool) -> list[tuple[str, str, str]]:
+    values = pointed([text for _, text, _ in pairs], commas)
+    return [(label, value, place) for (label, _, place), value in zip(pairs, values, strict=True)]
 
 
 def read_vectors_of_file(path: str | os.PathLike[str], graph: SignedDigraph, dimension: int) -> list[list[Fraction]]:
@@ -332,7 +338,8 @@ def read_vectors_of_file(path: str | os.PathLike[str], graph: SignedDigraph, dim
     """
     name, _ = name_and_ending(path)
     columns: list[list[tuple[str, str, str]]] = [[] for _ in range(dimension)]
-    for number, texts in records(read_bytes(path, name), name):
+    rows = Records(read_bytes(path, name), name)
+    for number, texts in rows:
         place, row = f"{name}, line {number}", [text.strip() for text in texts]
         if not any(row) or (not columns[0] and row[0] not in graph.index):
             continue  # a header
@@ -340,7 +347,7 @@ def read_vectors_of_file(path: str | os.PathLike[str], graph: SignedDigraph, dim
             raise FormatError(f"{place}: a row needs a node and {dimension} numbers; write node,x,y")
         for entries, text in zip(columns, row[1:], strict=True):
             entries.append((row[0], text, place))
-    states = [_in_node_order(entries, graph, name, FormatError) for entries in columns]
+    states = [_in_node_order(_with_points(entries, rows.commas), graph, name, FormatError) for entries in columns]
     return [list(row) for row in zip(*states, strict=True)]
 
 

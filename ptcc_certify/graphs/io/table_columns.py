@@ -229,6 +229,11 @@ def _told(titles: tuple[str, ...], others: Sequence[Sequence[str]], place: str, 
     if not by_title and edge_columns(titles, place) is None and not _is_header(titles, at[2], others, place):
         return Columns(at[0], at[1], at[2], told=True, notes=(_note(how.titles, 0, 1, 2),))
     notes, ends = [_note(titles, *at)], (titles[at[0]], titles[at[1]])
+    opposite = re.match(_HEARD, plain(ends[0])) and re.match(_LISTENERS, plain(ends[1]))
+    if by_title and opposite and how.orientation == "listens":
+        heard, listens = map(shorten, ends)
+        mend = f'leave "listens" out, or give the columns {listens},{heard},{shorten(titles[at[2]])}'
+        raise FormatError(f"{place}: the columns say that {listens} listens to {heard}, edges the opposite; {mend}")
     if _turned(*ends):
         notes.append(f"{' listens to '.join(map(shorten, ends))}{LISTENS}")
     return Columns(at[0], at[1], at[2], titles=titles, told=True, notes=tuple(notes))
@@ -298,23 +303,25 @@ def asks_of_corner(corner: str, line: str) -> str:
 
 
 def _is_header(titles: Sequence[str], weight: int, others: Sequence[Sequence[str]], place: str) -> bool:
-    """Tell whether a row is of titles: where all others have a number, or a sign, it has a word that is none.
+    """Tell whether a row is of titles: where others have a number, or a sign, it has a word that is none.
 
-    The word may be one for a sign, such as Trust, see :func:`_is_title`.
+    The word may be one for a sign, such as Trust, see :func:`_is_title`. Where others have words throughout, which are
+    refused, no node is called as it calls the ends.
     """
     title = titles[weight]
     if not re.match(r"[^\W\d_]", title) or _NO_TITLE.fullmatch(title):
         return False
     below = [row[weight].strip() for row in others if len(row) > max(weight, 1)]
+    nodes = {field.strip() for row in others for field in row[:2]}
     if is_entry(title):
-        nodes = {field.strip() for row in others for field in row[:2]}
         if not below or not nodes.isdisjoint(titles[:2]) or not _is_title(titles, title, below, nodes, place):
             return False
         if sign_of_word(title) == -1 and all(is_number(text) and text[0] != "-" for text in below):
             what = f"column {shorten(title)} has no negative number: sizes of negative weights, or signs?"
             raise FormatError(f"{place}: {what} Give weights their signs in a column called weight")
         return True
-    return bool(below) and (all(map(is_entry, below)) or (is_sign(title) and all(below)))
+    words = title not in below and all(below) and len(below) > 1 and nodes.isdisjoint(titles[:2])
+    return bool(below) and (any(map(is_entry, below)) or (is_sign(title) and all(below)) or words)
 
 
 def _is_title(titles: Sequence[str], title: str, below: Sequence[str], nodes: Iterable[str], place: str) -> bool:

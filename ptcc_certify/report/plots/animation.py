@@ -82,8 +82,11 @@ def animate(subject: Any, path: str | Path, *, seconds: float = 5, time_unit: st
 
 def _run_of(certificate: Any) -> Any:
     """Return the run that is shown, or refuse what has none."""
-    if not isinstance(certificate, Certificate) or certificate.of_family:
-        raise ParameterError("a film is of the certificate of one graph; give certify(graph, protocol, x0)")
+    if not isinstance(certificate, Certificate):
+        raise ParameterError("a film is of a certificate; give certify(graph, protocol, x0)")
+    if certificate.of_family:
+        what = "a film is of weights that are known and stay; this certificate is of intervals or modes"
+        raise ParameterError(f"{what}; certify without these, or draw a figure")
     if certificate.graph_proof.graph.n_nodes > LABELLED_NODES:
         raise ParameterError(f"a film shows at most {LABELLED_NODES} agents; draw a figure of these")
     part = certificate.proof.agents
