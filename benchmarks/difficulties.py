@@ -72,7 +72,10 @@ def problem(seed: int) -> tuple[list[str], dict[str, Any]]:
     if "switching" in names:
         factors = rng.integers(1, 5, graph.n_edges)
         edges = zip(graph.edges, factors.tolist(), strict=True)
-        asked["graph"] = {"day": graph, "night": SignedDigraph.from_edges([(s, t, w * f) for (s, t, w), f in edges], graph.labels)}
+        asked["graph"] = {
+            "day": graph,
+            "night": SignedDigraph.from_edges([(s, t, w * f) for (s, t, w), f in edges], graph.labels),
+        }
     if "uncertain" in names:
         asked["uncertainty"] = f"{rng.integers(1, 30)}%"
     x0, v0 = ([f"{x:.1f}" for x in rng.uniform(-5, 5, n)] for _ in range(2))
@@ -102,6 +105,8 @@ def ratios(made: Any, rng: np.random.Generator) -> list[tuple[str, float]]:
     """Return what runs of members show over what is proved."""
     late, protocol = made.late, made.protocol
     if late is None or not late.says_something or not can_run(protocol, late.messages):
+        return []
+    if late.leaders is not None and not late.rows:  # disturbances of groups of leaders, of which there is no run
         return []
     of, members = late.case.structure, []
     for mode in of.modes if isinstance(of, Family) else ():
@@ -145,7 +150,9 @@ def main(first: int, last: int) -> int:
         names, asked = problem(seed)
         begin = time.perf_counter()
         try:
-            made = ptcc.certify(asked.pop("graph"), asked.pop("protocol"), asked.pop("x0"), asks=ptcc.Asks(simulation=False), **asked)
+            made = ptcc.certify(
+                asked.pop("graph"), asked.pop("protocol"), asked.pop("x0"), asks=ptcc.Asks(simulation=False), **asked
+            )
         except (ParameterError, HypothesisError) as error:
             counted["refused"] += 1
             why[str(error).partition(";")[0][:110]] += 1

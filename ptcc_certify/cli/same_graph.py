@@ -51,17 +51,19 @@ def compare(
     try:
         found = pair.compare(options)
     except PTCCError as error:
+        if (flags := _flags_that_agree(pair, options)) is None:
+            raise FormatError(f"could not read your {pair.kind} {way}: {error}") from None
+        reason = f"could not read your {pair.kind} {name} {way}; accepted if {flags} is what you mean"
+        found = Compared(reason, {"graph_read": f"{name}, refused {way}: {error}"})
+    else:
+        late = isinstance((pair.document.get("messages") or {}).get("latency"), list)
+        delays = "; delays are the certificate's own, not compared" if late else ""
+        read = {"graph_read": f"{name}, read {way}: {found.facts['graph_read']}{delays}"}
+        if found.reason is None:
+            return report, found.facts | read
         flags = _flags_that_agree(pair, options)
-        mend = f"; the certificate is accepted if {flags} is what you mean" if flags else ""
-        raise FormatError(f"could not read your {pair.kind} {way}: {error}{mend}") from None
-    late = isinstance((pair.document.get("messages") or {}).get("latency"), list)
-    delays = "; delays are the certificate's own, not compared" if late else ""
-    read = {"graph_read": f"{name}, read {way}: {found.facts['graph_read']}{delays}"}
-    if found.reason is None:
-        return report, found.facts | read
-    flags = _flags_that_agree(pair, options)
-    reason = f"another {pair.kind} than {name}, read {way}; accepted if {flags} is what you mean"
-    found = Compared(reason if flags else found.reason, found.facts | read)
+        reason = f"another {pair.kind} than {name}, read {way}; accepted if {flags} is what you mean"
+        found = Compared(reason if flags else found.reason, found.facts | read)
     return replace(report, accepted=False, obligations=(), rejected="graph", reason=found.reason), found.facts
 
 
