@@ -163,6 +163,14 @@ class Assessment:
         return self.line(joined(": ", (little, "" if crowded else self.remark)), self.caveat, self.advice)
 
     @property
+    def brief(self) -> Sentence:
+        """The verdict line without the bound."""
+        if self.verdict != CERTIFIED:
+            return self.sentence
+        certified = f"{self.certified_part}{', but says little by T' if self.useful is False else ''}"
+        return self.line(certified, self.caveat, self.advice)
+
+    @property
     def text(self) -> str:
         """The verdict line, with fields named as in Python."""
         return spell(self.sentence)
