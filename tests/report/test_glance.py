@@ -11,6 +11,7 @@ from bad_inputs import ptcc as command
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
+from matplotlib.legend import Legend
 from matplotlib.text import Text
 from PIL import Image
 
@@ -86,8 +87,7 @@ def test_colours_tell_the_sign_of_a_state_and_are_legible_on_white_and_under_whi
 
 
 def test_final_states_stand_at_the_ends_of_lines_each_its_own() -> None:
-    texts = [text.get_text() for text in plot_glance(certificate("fig5a")).axes[1].texts]
-    ends = {text.rpartition(": ")[0]: float(text.rpartition(": ")[2]) for text in texts if ": " in text}
+    ends = dict(ends_told(plot_glance(certificate("fig5a")).axes[1]))
     final = certificate("fig5a").final_state
     for names, value in ends.items():
         for name in names.split(", "):
@@ -97,7 +97,7 @@ def test_final_states_stand_at_the_ends_of_lines_each_its_own() -> None:
 
 def ends_told(ax: Axes) -> list[tuple[str, float]]:
     """The names at the ends of lines, and the values beside them."""
-    texts = [text.get_text().replace("\n", " ") for text in ax.texts]
+    texts = [text.get_text().replace("\n", " ").replace("\N{MINUS SIGN}", "-") for text in ax.texts]
     return [(text.rpartition(": ")[0], float(text.rpartition(": ")[2])) for text in texts if ": " in text]
 
 
@@ -299,7 +299,7 @@ def test_the_caption_says_what_colours_tell(name: str, coloured: bool) -> None:
 @pytest.mark.parametrize(
     ("edges", "x0", "told"),
     [
-        ([("l", "b", 1), ("m", "c", 1)], {"l": 4, "m": -4, "b": 1000, "c": -4}, {"l, b: 4", "m, c: -4"}),
+        ([("l", "b", 1), ("m", "c", 1)], {"l": 4, "m": -4, "b": 1000, "c": -4}, {"l, b: 4", "m, c: \N{MINUS SIGN}4"}),
         ([("l", "b", 1), ("m", "c", 1)], {"l": "1.24", "m": "1.16", "b": 100, "c": -4}, {"l, b: 1.24", "m, c: 1.16"}),
         ([("a", "b", 1), ("b", "a", 2)], {"a": 1000, "b": 0}, {"a, b: 333"}),
         ([("a", "b", 1), ("b", "a", 2)], {"a": 10000, "b": 0}, {"a, b: 3333"}),
@@ -308,6 +308,17 @@ def test_the_caption_says_what_colours_tell(name: str, coloured: bool) -> None:
 def test_ends_are_told_to_three_digits_of_their_own(edges: list[Any], x0: dict[str, Any], told: set[str]) -> None:
     figure = plot_glance(ptcc.certify(edges, ptcc.NominalProtocol(T=1, rho1=1, rho2=3, kappa=2), x0))
     assert {text.get_text() for text in figure.axes[1].texts if ": " in text.get_text()} == told
+
+
+@pytest.mark.parametrize(
+    ("last", "squares", "key"), [([("b", "c", -1)], 2, "second camp"), ([], 1, "second camp of leaders")]
+)
+def test_followers_have_the_shape_of_the_camp_in_which_they_end(last: list[Any], squares: int, key: str) -> None:
+    edges = [("a", "b", 1), ("b", "a", 1), ("a", "d", -1), ("d", "a", -1), *(last or [("b", "c", 1), ("d", "c", 1)])]
+    figure = plot_glance(ptcc.certify(edges, ptcc.NominalProtocol(T=1, rho1=1, rho2=3, kappa=2), [1, 2, 3, 4]))
+    nodes = [line for line in figure.axes[0].lines if str(line.get_gid()).startswith("node-")]
+    assert sum(line.get_marker() == "s" for line in nodes) == squares
+    assert key in {text.get_text() for legend in figure.findobj(Legend) for text in legend.get_texts()}
 
 
 def test_steps_are_joined_beside_what_has_no_limit() -> None:

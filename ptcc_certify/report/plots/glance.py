@@ -116,7 +116,7 @@ def plot_glance(
     >>> foes = SignedDigraph.from_edges([("ann", "bob", -1), ("bob", "ann", -1)])
     >>> figure = plot_glance(certify(foes, NominalProtocol(T=1, rho1=1, rho2=2, kappa=1), [3, 5]))
     >>> [text.get_text() for text in figure.axes[1].texts]
-    ['ann', 'bob', 'ann: -1', 'bob: 1', '$T$ = 1']
+    ['ann', 'bob', 'ann: \u22121', 'bob: 1', '$T$ = 1']
     """
     certificate = read_back(subject)
     if not isinstance(certificate, Certificate):
