@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +22,9 @@ from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.animation import animate
 from ptcc_certify.report.plots.camp_lines import _written
 from ptcc_certify.report.plots.final_colours import ENDS, colours_of
-from ptcc_certify.report.plots.glance import joined_above, plot_glance
+from ptcc_certify.report.plots.glance import _asked, joined_above, plot_glance
 from ptcc_certify.report.plots.graph import node_id
+from ptcc_certify.report.plots.sizes import figures_for
 
 CORPUS = Path(__file__).parents[1] / "corpus"
 KINDS = [
@@ -325,3 +327,23 @@ def test_steps_are_joined_beside_what_has_no_limit() -> None:
     bound = np.repeat([4.0, np.inf, 2.0, 1.0], 10)
     joined = joined_above(np.arange(40.0), bound, 100)
     assert joined.shape == bound.shape and (joined >= bound).all() and np.isinf(joined[10:20]).all()
+
+
+@pytest.mark.parametrize("name", ["late-group", "sliding-containment"])
+def test_on_a_slide_the_legend_covers_no_node_and_names_at_the_ends_stand_apart(name: str) -> None:
+    with figures_for("slide"):
+        figure = plot_glance(certificate(name))
+        FigureCanvasAgg(figure).draw()
+    ax, runs = figure.axes[:2]
+    (legend,) = ax.figure.legends
+    nodes = [line for line in ax.lines if str(line.get_gid()).startswith("node-")]
+    centres = [line.get_transform().transform(line.get_xydata())[0] for line in nodes]
+    assert nodes and min(y for _, y in centres) > legend.get_window_extent().y1
+    boxes = [Text.get_window_extent(text) for text in runs.texts if ": " in text.get_text().replace("\n", " ")]
+    boxes.sort(key=lambda box: box.y0)
+    assert all(above.y0 > below.y1 - 0.25 * below.height for below, above in pairwise(boxes))
+
+
+def test_a_title_is_no_detail() -> None:
+    read = certificate("sampled-slowly")
+    assert _asked(read, read.facts())[0] == "under limits of the gain: nothing is proved"

@@ -1269,8 +1269,10 @@ def test_names_of_agents_that_end_at_one_place_do_not_cover_each_other():
         agents=ptcc_certify.Agents(order=2),
         asks=ptcc_certify.Asks(method="paper", simulation=False),
     )
-    first, second = (np.array(text.xyann) for text in ptcc_certify.plot_formation(cert).texts)
-    assert np.hypot(*(first - second)) > NAME_SIZE
+    texts = ptcc_certify.plot_formation(cert).texts
+    assert [text.get_text() for text in texts] == ["a", "b", "a", "b"]  # where they begin, and where they end
+    for first, second in (texts[:2], texts[2:]):
+        assert np.hypot(*np.subtract(first.xyann, second.xyann)) > NAME_SIZE
 
 
 @pytest.mark.few(0)

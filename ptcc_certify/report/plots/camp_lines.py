@@ -356,6 +356,8 @@ def _spread(
         else:
             groups.append([int(k)])
     texts = [_written([names[k] for k in sorted(own)], tails[own[0]], letters) for own in groups]
+    if any(tails) and gap * sum(1 + text.count("\n") for text in texts) > high - low:  # wider, but apart
+        texts = [text.replace("\n", " ") for text in texts]
     rows = np.array([1 + text.count("\n") for text in texts])
     sizes = min(gap, (high - low) / rows.sum()) * rows
     place = np.array([at[own[0]] for own in groups])
