@@ -347,3 +347,12 @@ def test_on_a_slide_the_legend_covers_no_node_and_names_at_the_ends_stand_apart(
 def test_a_title_is_no_detail() -> None:
     read = certificate("sampled-slowly")
     assert _asked(read, read.facts())[0] == "under limits of the gain: nothing is proved"
+
+
+def test_on_a_slide_modes_side_by_side_show_their_arrows() -> None:
+    with figures_for("slide"):
+        panel = plot_glance(certificate("switching")).axes[0].child_axes[0]
+    nodes = [line for line in panel.lines if len(line.get_xdata()) and line.get_markersize() > 6.1]
+    places = np.vstack([line.get_xydata() for line in nodes])
+    apart = min(float(np.hypot(*(p - q))) for k, p in enumerate(places) for q in places[:k])
+    assert apart > 2 * nodes[0].get_markersize()

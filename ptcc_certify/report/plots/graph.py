@@ -40,6 +40,8 @@ PANELS, BESIDE_NODES = 6, 8
 _SHAPE, _TITLE, _LEGEND = 0.72, 0.2, 0.72
 #: Widths of arrows in points: of the least weight that is drawn, what the largest adds, and where all are equal.
 _WIDTHS, _EQUAL = (0.6, 1.0), 0.9
+#: How many radii of few nodes a panel is high, at least.
+_RADII = 9
 #: Columns of a panel's name.
 _NAME = 24
 #: Marks of nodes that have colours of their own, and their sizes as shares of a circle's; others are circles.
@@ -232,7 +234,9 @@ def _layout(
     """Lay out arrows in a room in points, and bend them; a flat drawing takes less height."""
     n, inside = len(labels), max(map(columns, labels)) <= INSIDE
     radius = float(np.clip(32 / np.sqrt(n), 7.5 if n <= FREE_NODES else 6.3, 10)) if inside else 4.5
-    margin = np.array([4 * radius if inside else 60, 4 * radius])  # for labels
+    if n <= BESIDE_NODES:  # arrows are to be seen on a slide, too
+        radius = min(radius, room.min() / _RADII)
+    margin = np.array([4 * radius] * 2 if inside else [min(60, 0.45 * room[0]), 30])  # for labels
     place, bends = places_and_bends(arrows, part, radius, tuple(room - margin))
     high = min(room[1], float(np.ptp(place[:, 1])) + margin[1] + 20)  # for bent arrows, and labels
     return _Layout(labels, place, radius, inside, np.array([room[0], high])), bends
