@@ -80,7 +80,8 @@ class Assessment:
     """The graded verdict of a certificate: what it is worth, what became of what was asked, and the exit code.
 
     A bound is useful if it leaves at most 1 % at ``0.99 T``: of ``||E(0)||`` (or ``||eps(0)||``), or from the initial
-    state of the longest way of an agent; under the sliding-mode protocol of ``||E(T_r)||`` at ``T_r + 0.99 T_s``.
+    state of the longest way of an agent; under the sliding-mode protocol of ``||E(T_r)||`` at ``T_r + 0.99 T_s``. Where
+    it was asked what may be left at ``T``, that decides.
 
     Attributes
     ----------
@@ -89,11 +90,12 @@ class Assessment:
     violated : bool
         Whether the simulated run exceeds a proved bound.
     useful : bool or None
-        Whether the bound says something by the deadline with these gains; None if nothing is certified.
+        Whether the bound says something by the deadline with these gains; None if nothing is certified, or if less
+        was asked to be left and that is not met.
     remark : str, or tuple of str and Change
         What it says, or does not, or what to try next.
     advice : str, or tuple of str and Change
-        Gains with which the bound would be useful and the input bounded; empty if both hold, or if none are known.
+        Gains with which the bound would be useful and the input bounded, or what to try; empty if both hold.
     answers : tuple of Answer
         One for each expectation.
     caveat : str
@@ -159,6 +161,14 @@ class Assessment:
             return self.line(self.certified_part, "" if crowded else self.remark, self.caveat, self.advice)
         little = f"{self.certified_part}, but with these gains the bound says little by T"
         return self.line(joined(": ", (little, "" if crowded else self.remark)), self.caveat, self.advice)
+
+    @property
+    def brief(self) -> Sentence:
+        """The verdict line without the bound."""
+        if self.verdict != CERTIFIED:
+            return self.sentence
+        certified = f"{self.certified_part}{', but says little by T' if self.useful is False else ''}"
+        return self.line(certified, self.caveat, self.advice)
 
     @property
     def text(self) -> str:

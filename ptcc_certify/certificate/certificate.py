@@ -20,7 +20,7 @@ from ptcc_certify.certificate.proof import Source
 from ptcc_certify.certificate.read_document import read_document
 from ptcc_certify.certificate.section_io import read_side_files
 from ptcc_certify.checker import CheckReport
-from ptcc_certify.errors import FormatError, gated
+from ptcc_certify.errors import FormatError, gated, spell
 from ptcc_certify.graphs.io.files import refuse_no_path
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.recognised_files import refuse_as_certificate
@@ -60,7 +60,7 @@ class Certificate(Recorded):
     >>> day = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)])
     >>> night = SignedDigraph.from_edges([("c", "a", -2), ("a", "b", 1)])
     >>> certify({"day": day, "night": night}, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2, 3])
-    Certificate(bipartite consensus for every signal, rate 0.955184, certified)
+    Certificate(certified; bipartite consensus for every signal, rate 0.955184)
     """
 
     @property
@@ -116,7 +116,7 @@ class Certificate(Recorded):
 
     def __repr__(self) -> str:
         rate = "none" if self.proof.rate is None else down(self.proof.rate)
-        return f"Certificate({self.proof.headline}, rate {rate}, {self.verdict})"
+        return f"Certificate({spell(self.assessment.brief)}; {self.proof.headline}, rate {rate})"
 
 
 def read_certificate(
@@ -159,7 +159,7 @@ def read_certificate(
     ...     certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5]).save(f"{folder}/c.json")
     ...     saved = read_certificate(f"{folder}/c.json")
     >>> saved, saved.checked.accepted, [str(x) for x in saved.final_state.states]
-    (Certificate(signed-average consensus, Theorem 1.1, rate 3.99999, certified), True, ['-1', '1'])
+    (Certificate(certified; signed-average consensus, Theorem 1.1, rate 3.99999), True, ['-1', '1'])
     >>> bool(saved.norm_bound([0.5])[0] < saved.norm_bound([1])[0])
     True
     >>> saved.with_simulation(samples=11).comparison.violated

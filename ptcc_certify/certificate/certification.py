@@ -131,21 +131,21 @@ def certify(
     Examples
     --------
     >>> g = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
-    >>> cert = certify(g, NominalProtocol(T="0.6", rho1="0.1", rho2="0.3", kappa=1), [3, 5])
+    >>> cert = certify(g, NominalProtocol(T="0.6", rho1=1, rho2=2, kappa=1), [3, 5])
     >>> cert
-    Certificate(signed-average consensus, Theorem 1.1, rate 3.99999, certified)
+    Certificate(certified; signed-average consensus, Theorem 1.1, rate 3.99999)
     >>> cert.final_state
     FinalState(1=-1, 2=1)
     >>> robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
     >>> cert = certify(g, robust, InitialState([3, 5], sigma0=[1, 0]), asks=Asks(disturbance="sin(5*k*t)"))
     >>> cert
-    Certificate(signed-average consensus, Theorem 4.1, rate 3.99999, certified)
+    Certificate(certified; signed-average consensus, Theorem 4.1, rate 3.99999)
     >>> cert.reaching
     (ReachingTime(0.43409, 0.565 before T_r), ReachingTime(0, 1 before T_r))
     >>> cert.final_state
     FinalState(1=-1.5, 2=1.5)
     >>> certify(g, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), uncertainty="10%")
-    Certificate(bipartite consensus for every signal, rate 3.59999, certified)
+    Certificate(certified; bipartite consensus for every signal, rate 3.59999)
     """
     return certify_case(Case(graph, protocol, x0, uncertainty, signal, agents, messages, leaders, limits, asks))
 

@@ -36,6 +36,8 @@ class Fact:
         Whether it is left out of a screen of few lines.
     loud : bool
         Whether it warns.
+    asked : str
+        The clause, if it tells what is proved under all that was asked: for a title.
 
     Examples
     --------
@@ -51,6 +53,7 @@ class Fact:
     brief: tuple[Sentence, ...] = ()
     detail: bool = False
     loud: bool = False
+    asked: str = ""
 
     @property
     def changes(self) -> tuple[Change, ...]:

@@ -7,7 +7,8 @@
 
 Under the sliding-mode protocol with a reaching phase the first alone counts, from ``T_r`` on: ``||z||`` at
 ``T_r + 0.99 T_s`` against ``||z(T_r)||``. Of a family: of the largest ``|x_k(0)|``, for every agent, under the signals
-that were asked for; without an initial state, of the norm that decays under every signal.
+that were asked for; without an initial state, of the norm that decays under every signal. Where it was asked what may
+be left at ``T``, that decides. What is not useful comes with what to change.
 """
 
 from __future__ import annotations
@@ -33,10 +34,6 @@ from ptcc_certify.lyapunov.search import USEFUL
 
 #: The share of the time that is left where the bound is judged.
 LAST = Fraction(1, 100)
-
-
-#: What is much to be left with late messages, of the longest way, and what is asked for then.
-MUCH, LITTLE = 0.1, 0.05
 
 
 #: Digits of the gain that is proposed.
@@ -84,13 +81,42 @@ def use_of(proof: GraphProof | FamilyProof) -> Use:
     if proof.agents is not None:
         return _use_of_agents(proof.agents)
     if proof.late is not None:
-        return _use_of_tracking(proof.late) if proof.late.tracks else _use_of_late(proof, proof.late)
+        return _use_of_tracking(proof, proof.late) if proof.late.tracks else _use_of_late(proof, proof.late)
     if isinstance(proof, FamilyProof):
         return _use_of_family(proof)
     if proof.effort is not None and proof.effort.residual:
-        return Use(*_limited_usefulness(proof))
+        useful, remark = _limited_usefulness(proof)
+        return Use(useful, remark, advice="" if useful else _mend(proof))
     useful, remark, rho2 = _usefulness(proof)
-    return Use(useful, remark, *_advise(proof, rho2))
+    caveat, advice = _advise(proof, rho2)
+    return Use(useful, remark, caveat, joined("; ", (advice, "" if useful or rho2 is not None else _mend(proof))))
+
+
+def _mend(proof: GraphProof | FamilyProof) -> Sentence:
+    """Tell what to change of what was asked, where no number is known that leaves 1 %."""
+    messages, leaders, limits = proof.asked_messages, proof.asked_leaders, proof.limits
+    smaller = {
+        "delay": messages is not None and messages.largest_delay > 0,
+        "period": messages is not None and messages.held > 0,
+        "quantisation": messages is not None and messages.value_error > 0,
+        "leader_speed": leaders is not None and leaders.speed > 0,
+        "delta": leaders is not None and leaders.disturbance > 0,
+        "noise": proof.noise is not None,
+        "sample_period": any(limit.sample_period is not None for limit in limits),
+        "stop_before": any(limit.stop_before is not None for limit in limits),
+    }
+    cap = proof.late.messages.gain_cap if proof.late is not None else None
+    capped = cap is not None or any(limit.gain_cap is not None for limit in limits)
+    less = joined(" or ", ((Change(name),) for name, asked in smaller.items() if asked))
+    more = ("another ", Change("gain_cap")) if capped else ("a larger ", Change("rho2"))
+    pieces = (joined("", ("a smaller ", less)) if less else "", more if capped or not less else "")
+    return joined("", ("try ", joined(", or ", pieces)))
+
+
+def _enough(proof: GraphProof | FamilyProof, late: LateBounds, useful: bool) -> bool | None:
+    """Return whether so little is left, or what may be left at ``T`` was asked: None where that is not met."""
+    most = proof.expectations.max_residual
+    return useful if most is None else late.largest <= most or None
 
 
 def _use_of_family(proof: FamilyProof) -> Use:
@@ -114,7 +140,9 @@ def _use_of_family(proof: FamilyProof) -> Use:
         caveat = caveat or "the input is not proved bounded"
         mu3 = _rounded_up(1 / p.kappa)
         effects += [] if "bounds the input" in effects else ["bounds the input"]
-    return Use(useful, "" if useful is not False else "little is proved by 0.99 T", caveat, _gains(rho2, mu3, effects))
+    remark = "" if useful is not False else "little is proved by 0.99 T"
+    mend = _mend(proof) if useful is False and "leaves 1 %" not in effects else ""
+    return Use(useful, remark, caveat, joined("; ", (_gains(rho2, mu3, effects), mend)))
 
 
 def _gains(rho2: Fraction | None, mu3: Fraction | None, effects: list[str]) -> Sentence:
@@ -160,11 +188,12 @@ def _use_of_agents(part: AgentsAnswer) -> Use:
     worst = float(part.deviation_bound(last)[:, 0].max(initial=0.0))
     when = "T" if capped else "0.99 T"
     remark = f"every position within {'0' if part.never_off else up(worst, 2)} of its place at {when}"
-    if part.initial_state is None or not math.isfinite(worst):
-        return Use(fall <= USEFUL, f"deviations at {when} are {up(fall, 2)} of {part.first_ones}", caveat, advice)
     useful = worst <= USEFUL * part.longest_way if part.longest_way else fall <= USEFUL
-    if not useful and not capped and not advice:
-        advice = part.nearer
+    if part.initial_state is None or not math.isfinite(worst):
+        useful, remark = fall <= USEFUL, f"deviations at {when} are {up(fall, 2)} of {part.first_ones}"
+    if not useful:
+        nearer = ("try another ", Change("gain_cap")) if capped else part.nearer
+        advice = joined("; ", (advice, nearer))
     return Use(useful, remark, caveat, advice)
 
 
@@ -236,8 +265,8 @@ def _useful_rho2(envelope: Envelope, constant: float, kappa: Fraction) -> Fracti
 def _use_of_late(proof: GraphProof | FamilyProof, late: LateBounds) -> Use:
     """Tell whether what is left at ``T`` with late messages is a hundredth of the longest way of an agent, if known.
 
-    Of much more, and of what a shorter delay mends, it is told how to ask for one that leaves less. The rest of the
-    certificate knows of no delay: what it tells of the input does not hold here.
+    Of more, and of what a shorter delay alone mends, it is told how to ask for one that leaves so much. The rest of
+    the certificate knows of no delay: what it tells of the input does not hold here.
     """
     caveat = "" if late.inputs is not None else "the input is not proved bounded"
     if math.isinf(late.largest):
@@ -249,15 +278,18 @@ def _use_of_late(proof: GraphProof | FamilyProof, late: LateBounds) -> Use:
         way += float(max(map(abs, proved.vehicles.v0)) / (proved.gains[0] * late.case.exact.least_gain()))
     relative = " from within 1 of it" if late.relative else ""
     remark = f"every {late.whose} within {up(late.largest, 2)} of {late.goal} at T{relative}"
+    useful = _enough(proof, late, way is not None and late.largest <= USEFUL * way)
+    if useful is not False:
+        return Use(useful, remark, caveat)
     searched = isinstance(proof, GraphProof) and proof.graph.n_nodes <= EXACT_NODES and late.vehicles is None
-    asked = late.leaders is not None or late.messages.value_error or proof.expectations.max_residual is not None
-    advice: Sentence = ""
-    if way and late.largest > MUCH * way and searched and late.messages.age and not asked:
-        advice = Change("max_residual", down(way * LITTLE, 2)), f" asks for a delay that leaves {LITTLE * 100:g} %"
-    return Use(way is not None and late.largest <= USEFUL * way, remark, caveat, advice)
+    alone = late.leaders is None and not late.messages.value_error and late.messages.gain_cap is None
+    if not (way and searched and alone and late.messages.age):
+        return Use(useful, remark, caveat, _mend(proof))
+    delay = (Change("max_residual", down(Fraction(way) / 100, 2)), " asks for a delay that leaves 1 %")
+    return Use(useful, remark, caveat, delay)
 
 
-def _use_of_tracking(late: LateBounds) -> Use:
+def _use_of_tracking(proof: GraphProof | FamilyProof, late: LateBounds) -> Use:
     """Tell whether followers are nearer to their targets at ``0.99 T`` than a hundredth of what there was to go.
 
     That is what is proved at first, or how far the leaders may move by ``T`` if that is farther.
@@ -268,11 +300,12 @@ def _use_of_tracking(late: LateBounds) -> Use:
     first, last = (float(x) for x in late.largest_bound([0.0, 0.99 * T]))
     relative = " from within 1 of it" if late.relative else ""
     remark = f"every {late.whose} within {up(last, 2)} of {late.goal} at 0.99 T{relative}"
-    useful = last <= max(USEFUL * max(first, float(late.leaders.total) * T), _NOTHING)
+    useful = _enough(proof, late, last <= max(USEFUL * max(first, float(late.leaders.total) * T), _NOTHING))
+    mend = _mend(proof) if useful is False else ""
     if late.inputs is not None:
-        return Use(useful, remark)
-    mend = Change("rho2", late.bounding_rho2)
-    return Use(useful, remark, "the input is not proved bounded", (mend, " bounds the input"))
+        return Use(useful, remark, advice=mend)
+    bounding = (Change("rho2", late.bounding_rho2), " bounds the input")
+    return Use(useful, remark, "the input is not proved bounded", joined("; ", (bounding, mend)))
 
 
 # ---------------------------------------------------------------------- families

@@ -249,4 +249,5 @@ def _interval(doc: Document, paper: Paper, gamma: Mapping[int, Fraction]) -> Non
         admissible = end > 0 and _exceeds(doc, paper.structure, paper.weights(end), gamma, Fraction(0))
         need(admissible, "an end is not proved admissible")
     need(paper.rho <= ends["exact"], "rho lies beyond the interval")
-    doc.done(", ".join(f"{key} end {down(end)}" for key, end in ends.items()))
+    printed, exact = (down(ends[key]) for key in ("printed", "exact"))
+    doc.done(f"rho up to {printed} by the printed formula, up to {exact} by exact arithmetic")

@@ -95,7 +95,7 @@ def certify_published(entry: Published) -> Found:
     --------
     >>> from ptcc_certify.examples.published import PUBLISHED
     >>> certify_published(PUBLISHED["french"]).certificate
-    Certificate(consensus, Theorem 1.1, rate 0.999999, certified)
+    Certificate(met: consensus; certified; consensus, Theorem 1.1, rate 0.999999)
     """
     x0 = None if entry.x0 is None else dict(entry.x0)
     return Found(entry, certify(entry.graph(), entry.protocol(), x0, asks=Asks(expectations=entry.behaviour)))

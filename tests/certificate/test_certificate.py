@@ -270,8 +270,8 @@ def test_writing_and_reading_back(tmp_path: Path):
     cert.save(tmp_path / "c.json")
     assert read(tmp_path / "c.json") == cert.to_dict() == through_json(cert)
     assert check(tmp_path / "c.json") == check(cert.to_dict()) == cert.checked
-    assert repr(cert).startswith("Certificate(bipartite containment, Theorem 3.1, rate ")
-    assert repr(cert).endswith(", certified)")
+    assert repr(cert).startswith("Certificate(certified")
+    assert "; bipartite containment, Theorem 3.1, rate " in repr(cert)
 
 
 BROKEN: dict[str, Callable[[str], str | bytes]] = {

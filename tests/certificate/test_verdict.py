@@ -104,6 +104,7 @@ def test_a_bound_that_is_certified_and_says_nothing_is_not_called_certified_alon
     assert slow.assessment.text.startswith("certified, but with these gains the bound says little by T: ||E|| <= ")
     assert slow.assessment.exit_code == 0 and slow.to_dict()["verdict"] == "certified"
     assert "says little" in certificate_lines(slow, "fig5b")[0]
+    assert str(slow).startswith("Certificate(certified, but says little by T; the input is not bounded; rho2=")
 
 
 def test_what_is_useful_is_stated_and_true():
@@ -263,6 +264,7 @@ def test_page_statement_and_notebook_say_the_same(tmp_path: Path):
     assert '<div class="verdict doubt">' in page and "says little by T" in page and "refuted: rate ≥ 10" in page
     assert "\n% With these gains the bound says little by the deadline.\n" in text  # an opinion, for who edits the text
     assert "says little by T" in weak._repr_html_() and "refuted: rate" in weak._repr_html_()
+    assert repr(weak).startswith("Certificate(refuted: rate >= 10 (upper bound 9.04416")
     strong().save(tmp_path / "d.json")
     fine = read_certificate(tmp_path / "d.json")
     assert '<div class="verdict good">' in report_html(fine) and "says little" not in report_latex(fine)

@@ -1011,13 +1011,30 @@ def test_leaders_of_speed_0_are_told_to_rest() -> None:
     assert ptcc("simulate", "team.csv", *START, "--delta", "1", "--delay", "0.01", "-o", "r.csv").code == 0
 
 
-def test_where_late_messages_leave_much_the_verdict_says_how_to_ask_for_a_delay_that_leaves_less() -> None:
-    asked = ("certify", "team.csv", "--delay", "0.3", *START, *QUICK)
+@pytest.mark.parametrize("delay", ["0.3", "0.02"])
+def test_where_late_messages_leave_more_than_1_percent_the_verdict_says_how_to_ask_for_less(delay: str) -> None:
+    asked = ("certify", "team.csv", "--delay", delay, *START, *QUICK)
     words = " ".join(ptcc(*asked).out.split())
-    advice = re.search(r"(--max-residual) ([\d.]+) asks for a delay that leaves 5 %", words)
+    advice = re.search(r"says little by T; .*(--max-residual) ([\d.]+) asks for a delay that leaves 1 %", words)
     assert advice is not None, words
-    assert Fraction(advice[2]) == Fraction(3, 20)  # the longest way is 3, from 4 to 1
+    assert Fraction(advice[2]) == Fraction(3, 100)  # the longest way is 3, from 4 to 1
     text = " ".join(ptcc(*asked, *advice.groups()).out.split())
     told = re.search(r"certified where nothing is older than ([\d.]+\d)", text)
-    assert told is not None
-    assert "asks for a delay" not in ptcc("certify", "team.csv", "--delay", told[1], *START, *QUICK).out
+    assert told is not None and "says little" not in text
+    followed = ptcc("certify", "team.csv", "--delay", told[1], *START, *QUICK).out
+    assert "asks for a delay" not in followed and "says little" not in followed
+
+
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        (("--leader-speed", "2", "--gain-cap", "9"), "try a smaller --leader-speed, or another --gain-cap"),
+        (("--delay", "0.05", "--leader-speed", "1"), "try a smaller --delay or --leader-speed"),
+    ],
+)
+def test_what_says_little_comes_with_what_to_change_and_not_beside_what_is_met(more: tuple[str, ...], told: str):
+    asked = ("certify", "team.csv", *START, *QUICK, *more)
+    words = " ".join(ptcc(*asked).out.split())
+    assert "says little by T; " in words and told in words, words
+    met = " ".join(ptcc(*asked, "--max-residual", "9").out.split())
+    assert "verdict met: within 9 at T" in met and "says little" not in met, met

@@ -65,6 +65,13 @@ def test_c_code_of_the_guide_compiles_and_computes_what_python_does(tmp_path, mo
         np.testing.assert_allclose(inputs, np.array(python(instant, state)).ravel(), rtol=1e-12, atol=1e-12)  # type: ignore[operator]
         np.testing.assert_allclose(inputs, -gain * (graph.laplacian() @ state), rtol=1e-12, atol=1e-12)
     assert "bob" in (tmp_path / "bob.c").read_text()
+    (main,) = blocks(page, "c")
+    Path("main.c").write_text(main[1])
+    command = re.search("gcc .* main", main[1])
+    assert command is not None and subprocess.run(command[0].split(), check=True).returncode == 0
+    printed = subprocess.run(["./main"], check=True, capture_output=True, text=True).stdout.split()
+    expected = np.array(python(0.5, [5, 2, -4])).ravel()  # type: ignore[operator]
+    np.testing.assert_allclose([float(u) for u in printed], expected, rtol=1e-12)
 
 
 def test_an_agent_that_listens_to_nobody_has_no_input():

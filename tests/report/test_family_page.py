@@ -150,7 +150,7 @@ def test_a_page_of_an_undecided_family_says_what_to_try_and_claims_nothing(made,
     )
     undecided = made.changed(parts=parts)
     assert write_report(undecided, tmp_path / "u.html", simulation=False) == "undecided"
-    assert repr(undecided) == "Certificate(not decided, rate none, undecided)"
+    assert repr(undecided).startswith("Certificate(undecided: ") and "; not decided, rate none)" in repr(undecided)
     assert undecided.to_dict()["verdict"] == "undecided" and undecided.to_pandas()["least"].isna().all()
     text = words((tmp_path / "u.html").read_text("utf-8"))
     assert "Undecided refutes nothing" in text and "Undecided: what the agents do" in text and "not decided" in text

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from bad_inputs import ptcc as command
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
+from matplotlib.legend import Legend
 from matplotlib.text import Text
 from PIL import Image
 
@@ -20,8 +22,9 @@ from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.animation import animate
 from ptcc_certify.report.plots.camp_lines import _written
 from ptcc_certify.report.plots.final_colours import ENDS, colours_of
-from ptcc_certify.report.plots.glance import joined_above, plot_glance
+from ptcc_certify.report.plots.glance import _asked, joined_above, plot_glance
 from ptcc_certify.report.plots.graph import node_id
+from ptcc_certify.report.plots.sizes import figures_for
 
 CORPUS = Path(__file__).parents[1] / "corpus"
 KINDS = [
@@ -86,8 +89,7 @@ def test_colours_tell_the_sign_of_a_state_and_are_legible_on_white_and_under_whi
 
 
 def test_final_states_stand_at_the_ends_of_lines_each_its_own() -> None:
-    texts = [text.get_text() for text in plot_glance(certificate("fig5a")).axes[1].texts]
-    ends = {text.rpartition(": ")[0]: float(text.rpartition(": ")[2]) for text in texts if ": " in text}
+    ends = dict(ends_told(plot_glance(certificate("fig5a")).axes[1]))
     final = certificate("fig5a").final_state
     for names, value in ends.items():
         for name in names.split(", "):
@@ -97,7 +99,7 @@ def test_final_states_stand_at_the_ends_of_lines_each_its_own() -> None:
 
 def ends_told(ax: Axes) -> list[tuple[str, float]]:
     """The names at the ends of lines, and the values beside them."""
-    texts = [text.get_text().replace("\n", " ") for text in ax.texts]
+    texts = [text.get_text().replace("\n", " ").replace("\N{MINUS SIGN}", "-") for text in ax.texts]
     return [(text.rpartition(": ")[0], float(text.rpartition(": ")[2])) for text in texts if ": " in text]
 
 
@@ -299,7 +301,7 @@ def test_the_caption_says_what_colours_tell(name: str, coloured: bool) -> None:
 @pytest.mark.parametrize(
     ("edges", "x0", "told"),
     [
-        ([("l", "b", 1), ("m", "c", 1)], {"l": 4, "m": -4, "b": 1000, "c": -4}, {"l, b: 4", "m, c: -4"}),
+        ([("l", "b", 1), ("m", "c", 1)], {"l": 4, "m": -4, "b": 1000, "c": -4}, {"l, b: 4", "m, c: \N{MINUS SIGN}4"}),
         ([("l", "b", 1), ("m", "c", 1)], {"l": "1.24", "m": "1.16", "b": 100, "c": -4}, {"l, b: 1.24", "m, c: 1.16"}),
         ([("a", "b", 1), ("b", "a", 2)], {"a": 1000, "b": 0}, {"a, b: 333"}),
         ([("a", "b", 1), ("b", "a", 2)], {"a": 10000, "b": 0}, {"a, b: 3333"}),
@@ -310,7 +312,47 @@ def test_ends_are_told_to_three_digits_of_their_own(edges: list[Any], x0: dict[s
     assert {text.get_text() for text in figure.axes[1].texts if ": " in text.get_text()} == told
 
 
+@pytest.mark.parametrize(
+    ("last", "squares", "key"), [([("b", "c", -1)], 2, "second camp"), ([], 1, "second camp of leaders")]
+)
+def test_followers_have_the_shape_of_the_camp_in_which_they_end(last: list[Any], squares: int, key: str) -> None:
+    edges = [("a", "b", 1), ("b", "a", 1), ("a", "d", -1), ("d", "a", -1), *(last or [("b", "c", 1), ("d", "c", 1)])]
+    figure = plot_glance(ptcc.certify(edges, ptcc.NominalProtocol(T=1, rho1=1, rho2=3, kappa=2), [1, 2, 3, 4]))
+    nodes = [line for line in figure.axes[0].lines if str(line.get_gid()).startswith("node-")]
+    assert sum(line.get_marker() == "s" for line in nodes) == squares
+    assert key in {text.get_text() for legend in figure.findobj(Legend) for text in legend.get_texts()}
+
+
 def test_steps_are_joined_beside_what_has_no_limit() -> None:
     bound = np.repeat([4.0, np.inf, 2.0, 1.0], 10)
     joined = joined_above(np.arange(40.0), bound, 100)
     assert joined.shape == bound.shape and (joined >= bound).all() and np.isinf(joined[10:20]).all()
+
+
+@pytest.mark.parametrize("name", ["late-group", "sliding-containment"])
+def test_on_a_slide_the_legend_covers_no_node_and_names_at_the_ends_stand_apart(name: str) -> None:
+    with figures_for("slide"):
+        figure = plot_glance(certificate(name))
+        FigureCanvasAgg(figure).draw()
+    ax, runs = figure.axes[:2]
+    (legend,) = ax.figure.legends
+    nodes = [line for line in ax.lines if str(line.get_gid()).startswith("node-")]
+    centres = [line.get_transform().transform(line.get_xydata())[0] for line in nodes]
+    assert nodes and min(y for _, y in centres) > legend.get_window_extent().y1
+    boxes = [Text.get_window_extent(text) for text in runs.texts if ": " in text.get_text().replace("\n", " ")]
+    boxes.sort(key=lambda box: box.y0)
+    assert all(above.y0 > below.y1 - 0.25 * below.height for below, above in pairwise(boxes))
+
+
+def test_a_title_is_no_detail() -> None:
+    read = certificate("sampled-slowly")
+    assert _asked(read, read.facts())[0] == "under limits of the gain: nothing is proved"
+
+
+def test_on_a_slide_modes_side_by_side_show_their_arrows() -> None:
+    with figures_for("slide"):
+        panel = plot_glance(certificate("switching")).axes[0].child_axes[0]
+    nodes = [line for line in panel.lines if len(line.get_xdata()) and line.get_markersize() > 6.1]
+    places = np.vstack([line.get_xydata() for line in nodes])
+    apart = min(float(np.hypot(*(p - q))) for k, p in enumerate(places) for q in places[:k])
+    assert apart > 2 * nodes[0].get_markersize()

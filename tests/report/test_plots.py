@@ -485,7 +485,7 @@ def test_every_arrow_keeps_away_from_nodes_that_are_not_its_ends(name: str) -> N
 
 def test_weights_are_written_where_they_differ_and_there_are_few() -> None:
     differ = plot_graph([("a", "b", 1), ("b", "c", -2.5), ("c", "a", "1/3")])
-    assert {text.get_text() for text in differ.texts[3:]} == {"1", "2.5", "0.333"}
+    assert {text.get_text() for text in differ.texts[3:]} == {"1", "\N{MINUS SIGN}2.5", "0.333"}
     assert len(plot_graph([("a", "b", 2), ("b", "c", -2)]).texts) == 3
     many = plot_graph(SignedDigraph.from_edges([(k, k % 30 + 1, k) for k in range(1, 31)]))
     assert len(many.texts) == 30 and len({patch.get_linewidth() for patch in arrows_in(many)}) == 30
@@ -1269,8 +1269,10 @@ def test_names_of_agents_that_end_at_one_place_do_not_cover_each_other():
         agents=ptcc_certify.Agents(order=2),
         asks=ptcc_certify.Asks(method="paper", simulation=False),
     )
-    first, second = (np.array(text.xyann) for text in ptcc_certify.plot_formation(cert).texts)
-    assert np.hypot(*(first - second)) > NAME_SIZE
+    texts = ptcc_certify.plot_formation(cert).texts
+    assert [text.get_text() for text in texts] == ["a", "b", "a", "b"]  # where they begin, and where they end
+    for first, second in (texts[:2], texts[2:]):
+        assert np.hypot(*np.subtract(first.xyann, second.xyann)) > NAME_SIZE
 
 
 @pytest.mark.few(0)

@@ -243,6 +243,7 @@ def test_every_page_is_sound_and_says_what_it_is(name: str, tmp_path: Path):
             if row[0] == s.kind and row[1].startswith(plain(f"{set_text(s.statement)} ({set_text(s.lemma)})"))
         ]
         assert plain(f"{s.of}: {set_text(s.detail)}") in row[2]
+    assert "printed end" not in page.text and ("counted from 0" in page.text) == ("decays[0]" in page.text)
     figures = {a["id"] for a in page.named("figure")}
     for figure in ("figure-states", "figure-decay", "figure-input"):
         assert (figure in figures) == (name not in ("no start", "single"))

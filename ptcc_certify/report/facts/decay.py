@@ -112,11 +112,12 @@ def error_facts(certificate: Certificate, drawn: bool, details: bool) -> Facts:
     if proof.constant:
         invariant = "its state" if certificate.direct else "x - sigma"
         note = f"none: no agent listens to another, each keeps {invariant}"
-        yield from said_without(certificate, [Fact(head="error", note=note)])
+        yield from said_without(certificate, [Fact(head="error", note=note, asked=note)])
         return
     residual = () if proof.effort is None else proof.effort.residual
     if proof.at_rest and not any(entry.noise for entry in residual):
-        yield from said_without(certificate, [Fact(head="error", note="none: every agent begins at its final state")])
+        note = "none: every agent begins at its final state"
+        yield from said_without(certificate, [Fact(head="error", note=note, asked=note)])
         return
     if residual:
         yield _error_fact("proved", _limited_error(residual))
@@ -137,7 +138,9 @@ def _error_fact(standing: Standing, told: tuple[Fraction | float, str, str, str]
     value, norm, agents, more = told
     texts = [norm + agents.replace("every agent", whom) + more for whom in ("every agent", "agents", "each")]
     brief = [*([] if drawn else texts), norm + more]
-    return Fact(head="error", value=value, side="up", standing=standing, note=brief[0], brief=tuple(brief))
+    return Fact(
+        head="error", value=value, side="up", standing=standing, note=brief[0], brief=tuple(brief), asked=brief[0]
+    )
 
 
 def _limited_error(residual: Sequence[Limited]) -> tuple[Fraction | float, str, str, str]:

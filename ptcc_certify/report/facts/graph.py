@@ -144,7 +144,7 @@ def _graph_text(structure: Structure, name: str) -> str:
     """Tell the size and the connectivity of a graph, its name as long as fits beside them."""
     rest = _size(structure)
     if len(rest) + columns(name) > TEXT:
-        rest = rest.replace("ly connected", "").replace("disconnected, ", "")
+        rest = rest.replace("disconnected, ", "")
         name = PurePath(name).name
     if len(rest) + min(columns(name), 8) > TEXT:  # the claims tell how many components there are
         rest = rest.rpartition(", ")[0]

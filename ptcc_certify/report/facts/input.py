@@ -34,7 +34,7 @@ def said_without(certificate: Certificate, facts: Iterable[Fact]) -> Facts:
     first = "".join(f"{text}: " for text in without(certificate))
     for fact in facts:
         brief = tuple(joined("", (first, text)) for text in fact.brief)
-        yield replace(fact, note=joined("", (first, fact.note)), brief=brief) if first else fact
+        yield replace(fact, note=joined("", (first, fact.note)), brief=brief, asked="") if first else fact
 
 
 def input_facts(certificate: Certificate, details: bool) -> Facts:

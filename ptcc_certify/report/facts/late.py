@@ -132,7 +132,7 @@ def _tracking(late: LateBounds, leaders: MovingLeaders, at: Fraction | None) -> 
     where = f"within {up(late.largest, 2)} of {late.goal}" if late.largest else f"on {late.goal}"
     then = "" if after is None else f", within {up(after, 2)} of it from then on" if after else ", and ever after"
     text = f"every {late.whose} {where} at T = {near(protocol.T)}{then}"
-    yield Fact(head=head, note=text, brief=(f"{text};",))
+    yield Fact(head=head, note=text, brief=(f"{text};",), asked=text)
     instants = {"0.9 T": protocol.T * 9 / 10, "0.99 T": protocol.T * 99 / 100}
     if at is not None:
         instants = {f"t = {near(at)}": at}
@@ -257,10 +257,12 @@ def _left(late: LateBounds) -> Facts:
         note = f"{cap}nothing is proved of what is left at T"
         yield Fact(head="late", standing="unproved", note=joined("; ", (note, limit)))
         return
-    notes = [f"{cap}{_within_text(late, digits)}" for digits in (3, 2)]
+    settling = "; leaders hear each other at once, and settle by themselves" if late.settling is not None else ""
+    within, shorter = (_within_text(late, digits) for digits in (3, 2))
+    notes = [f"{cap}{text}{settling if late.largest else ''}" for text in (within, shorter)]
     formed = late.largest in [float_up(max(one.residual)) for one in (late.form, late.lmi) if one is not None]
     brief = joined("; ", (notes[1], limit if formed else ""))
-    yield Fact(head="late", value=late.largest, side="up", note=notes[0], brief=(brief,))
+    yield Fact(head="late", value=late.largest, side="up", note=notes[0], brief=(brief,), asked=within)
     if formed and limit:
         yield Fact(head="late", standing="unproved", note=limit, detail=True)
 
@@ -273,8 +275,7 @@ def _within_text(late: LateBounds, digits: int) -> str:
     if late.leaders is not None and not late.forms:
         text = f"every follower within {up(late.largest, digits)} of {late.goal} at T"
         text += "" if late.after is None else f", within {up(late.after, digits)} from then on"
-    text += FROM_WITHIN_1 if late.relative else ""
-    return text + ("; leaders hear each other at once, and settle by themselves" if late.settling is not None else "")
+    return text + (FROM_WITHIN_1 if late.relative else "")
 
 
 def _kept_off(late: LateBounds) -> Facts:
@@ -301,7 +302,8 @@ def _stages(late: LateBounds) -> Facts:
         note = "no deadlines of stages: information takes longer than T from the leaders to the last agent"
         yield Fact(head="late", note=note)
     elif late.direct:
-        yield Fact(head="late", note="every agent exactly at its final state at T: all hear of leaders alone")
+        note = "every agent exactly at its final state at T: all hear of leaders alone"
+        yield Fact(head="late", note=note, asked=note)
     elif late.staged is not None and late.largest:
         when = f"from {near(min(late.staged))} to {near(max(late.staged))}, {near(late.messages.age)} apart"
         yield Fact(head="late", note=f"exactly at x(T) by T if agents have deadlines of their own, {when}")

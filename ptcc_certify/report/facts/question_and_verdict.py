@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from lmi.exact.decimal_rounding import near
 from ptcc_certify.certificate.assessment import CERTIFIED, rejects
 from ptcc_certify.certificate.fact import Fact, Facts
-from ptcc_certify.errors import Change, Sentence, labelled
+from ptcc_certify.errors import Change, Sentence, joined, labelled, spell
 from ptcc_certify.report.facts.input import initial_states_text
 from ptcc_certify.report.text_layout import arithmetic
 
@@ -111,13 +111,9 @@ def verdict_facts(certificate: Certificate) -> Facts:
     else:
         proved = f"{len(report.obligations)} proof obligations proved in {arithmetic(certificate.direct)}"
         yield Fact(head="proof", note=f"{proved}; checked without a solver: accepted", detail=True)
-    brief = assessment.sentence
+    brief = assessment.brief
     if assessment.verdict == CERTIFIED:
-        certified = assessment.certified_part
-        certified += ", but says little by T" if assessment.useful is False else ""
-        plain = certified == CERTIFIED and not assessment.answers and not assessment.caveat
-        checked = "checked without a solver" if plain else ""
-        brief = assessment.line(certified, checked, assessment.caveat, assessment.advice, ended)
+        brief = joined("; ", (brief, "checked without a solver" if spell(brief) == CERTIFIED else "", ended))
     yield Fact(head="verdict", value=assessment.verdict, note=assessment.sentence, brief=(brief,))
 
 

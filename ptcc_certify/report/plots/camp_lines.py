@@ -14,7 +14,7 @@ from scipy.optimize import isotonic_regression
 from lmi.exact.decimal_rounding import near
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import Structure, analyse, find_camps
-from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, STEPS, tick_count
+from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, STEPS, signed, tick_count
 from ptcc_certify.report.text_layout import columns, printable, shorten_text
 from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.simulation.trajectory import Trajectory
@@ -220,7 +220,7 @@ def name_agents(
     enders, enders_colours, tails, early = agents, colours, [""] * len(agents), np.zeros(len(values), dtype=bool)
     at_end = values[:, np.searchsorted(run.t, last * (1 + 1e-12), side="right") - 1]
     if told is not None:
-        tail_of = [f": {value + 0.0:.{4 if 1e3 <= abs(value) < 1e4 else 3}g}" for value in told.tolist()]
+        tail_of = [f": {signed(value, 4 if 1e3 <= abs(value) < 1e4 else 3)}" for value in told.tolist()]
         colour_of = {tail_of[v]: lines[v] for v in reversed(agents)}
         enders = [*agents, *(v for v, tail in enumerate(tail_of) if v not in lines and tail in colour_of)]
         tails = [tail_of[v] for v in enders]
@@ -356,6 +356,8 @@ def _spread(
         else:
             groups.append([int(k)])
     texts = [_written([names[k] for k in sorted(own)], tails[own[0]], letters) for own in groups]
+    if any(tails) and gap * sum(1 + text.count("\n") for text in texts) > high - low:  # wider, but apart
+        texts = [text.replace("\n", " ") for text in texts]
     rows = np.array([1 + text.count("\n") for text in texts])
     sizes = min(gap, (high - low) / rows.sum()) * rows
     place = np.array([at[own[0]] for own in groups])

@@ -45,6 +45,8 @@ from ptcc_certify.theorems.family_behaviour import DEPENDS
 
 #: Height of the panels in inches, and how much wider the runs are drawn than the graph.
 _HIGH, _RATIO = 3.0, 1.35
+#: The share of the height of the graph's panel that its legend has, or more where it has many rows.
+_BELOW = 0.16
 #: Inches that panels have on a slide, however long the words above them are.
 _LEAST_HIGH = 2.0
 #: Inches below which one stands above the other; their heights, and what each agent beyond eight adds for its names.
@@ -116,7 +118,7 @@ def plot_glance(
     >>> foes = SignedDigraph.from_edges([("ann", "bob", -1), ("bob", "ann", -1)])
     >>> figure = plot_glance(certify(foes, NominalProtocol(T=1, rho1=1, rho2=2, kappa=1), [3, 5]))
     >>> [text.get_text() for text in figure.axes[1].texts]
-    ['ann', 'bob', 'ann: -1', 'bob: 1', '$T$ = 1']
+    ['ann', 'bob', 'ann: \u22121', 'bob: 1', '$T$ = 1']
     """
     certificate = read_back(subject)
     if not isinstance(certificate, Certificate):
@@ -197,7 +199,7 @@ class _Head(NamedTuple):
     def of(cls, certificate: Certificate, width: float) -> Self:
         """Return what is told of a certificate, in lines for so many inches."""
         facts = [fact for fact in facts_of(certificate, details=False) if not fact.detail]
-        (verdict,) = [spell(fact.note) for fact in facts if fact.head == "verdict"]
+        verdict = spell(certificate.assessment.brief)
         fine = not certificate.assessment.exit_code and certificate.assessment.useful is not False
         notes = [] if fine and verdict.partition(";")[0] == "certified" else [f"verdict: {verdict}"]
         asked, told = _asked(certificate, facts)
@@ -264,10 +266,8 @@ def _asked(certificate: Certificate, facts: Sequence[Fact]) -> tuple[str, Fact |
     if late is None and leaders is None:
         if not certificate.limits or certificate.proof.agents is not None:
             return "", None
-        proved = [f for f in facts if f.head == "error" and not spell(f.note).startswith("without")]
-        if not proved:
-            return "under limits of the gain: nothing is proved", None
-        return spell(proved[0].brief[0] if proved[0].brief else proved[0].note), proved[0]
+        told = next((fact for fact in facts if fact.head == "error" and fact.asked), None)
+        return ("under limits of the gain: nothing is proved" if told is None else told.asked), told
     messages = None if late is None else late.messages
     parts = {
         "moving leaders": leaders is not None and leaders.speed > 0,
@@ -282,11 +282,8 @@ def _asked(certificate: Certificate, facts: Sequence[Fact]) -> tuple[str, Fact |
         given = [" of ".join([*given[:1], "vehicles"]), *given[1:]]
     capped = certificate.limits or (messages is not None and messages.gain_cap is not None)
     under = " ".join(filter(None, (", ".join(given), "under a gain cap" if capped else "")))
-    every = [f for f in facts if f.head in ("late", "tracking", "limited") and "every " in spell(f.note)]
-    if not every:
-        return f"{under}: nothing is proved", None
-    text = spell(every[0].note)
-    return f"{under}: {text[text.index('every ') :].partition(';')[0]}", every[0]
+    told = next((fact for fact in facts if fact.head in ("late", "tracking", "limited") and fact.asked), None)
+    return f"{under}: {'nothing is proved' if told is None else told.asked}", told
 
 
 #: Blanks at which no line breaks: before a sign of percent, about equality, around numbers of theorems or T.
@@ -312,16 +309,24 @@ def _draw_graph(panel: SubFigure, certificate: Certificate, ends: np.ndarray, co
     """Draw who listens to whom, in the colours of final states; of a graph too large for that its final states."""
     subject = certificate.family_proof.family if certificate.of_family else certificate.graph_proof.structure
     if ends.size <= LABELLED_NODES:
-        beside = max(map(columns, certificate.labels)) > INSIDE  # labels reach beyond the nodes
-        ax = panel.add_axes((0.11, 0.16, 0.78, 0.82) if beside else (0.02, 0.16, 0.96, 0.82))
-        plot_graph(subject, ax=ax, colours=colours, delays=delays_of(certificate))
-        if (legend := ax.get_legend()) is not None:
+        beside = 0.11 if max(map(columns, certificate.labels)) > INSIDE else 0.02  # labels reach beyond the nodes
+        low, narrow = _BELOW, {"columnspacing": 1, "handlelength": 1.5, "handletextpad": 0.5, "frameon": False}
+        for last in (False, True):  # a legend of many rows takes room from the graph
+            ax = panel.add_axes((beside, low, 1 - 2 * beside, 0.98 - low))
+            plot_graph(subject, ax=ax, colours=colours, delays=delays_of(certificate))
+            if (legend := ax.get_legend()) is None:
+                return
             texts = [text.get_text() for text in legend.get_texts()]
             handles: Any = legend.legend_handles
             legend.remove()
             number = legend_columns(texts, panel.bbox.width / panel.dpi, 3)
-            narrow: dict[str, Any] = {"columnspacing": 1, "handlelength": 1.5, "handletextpad": 0.5, "frameon": False}
-            panel.legend(handles, texts, loc="lower center", ncols=number, **narrow)
+            legend = panel.legend(handles, texts, loc="lower center", ncols=number, **narrow)
+            high = legend.get_window_extent().height / panel.bbox.height + 0.02
+            if last or high <= low:
+                return
+            low = high
+            legend.remove()
+            ax.remove()
     elif ends.size <= DRAWN_NODES:
         plot_graph(subject, ax=new_axes(panel))
     elif np.isfinite(ends).all():

@@ -25,7 +25,7 @@ from ptcc_certify.report.plots.final_colours import colours_at_end
 from ptcc_certify.report.plots.graph_labels import INSIDE, boxes_along, draw_labels, draw_sizes
 from ptcc_certify.report.plots.graph_layout import FREE_NODES, Arrow, places_and_bends, triangles_of
 from ptcc_certify.report.plots.sizes import SINGLE_COLUMN, current_sizes
-from ptcc_certify.report.plots.style import BEHIND, EDGE_STYLES, axes_of, finished, styled
+from ptcc_certify.report.plots.style import BEHIND, EDGE_STYLES, axes_of, finished, signed, styled
 from ptcc_certify.report.plots.subject import is_of_family, structure_of
 from ptcc_certify.report.text_layout import columns, printable, shorten_text
 from ptcc_certify.theorems.counterexample_text import mode_name
@@ -40,6 +40,8 @@ PANELS, BESIDE_NODES = 6, 8
 _SHAPE, _TITLE, _LEGEND = 0.72, 0.2, 0.72
 #: Widths of arrows in points: of the least weight that is drawn, what the largest adds, and where all are equal.
 _WIDTHS, _EQUAL = (0.6, 1.0), 0.9
+#: How many radii of few nodes a panel is high, at least.
+_RADII = 9
 #: Columns of a panel's name.
 _NAME = 24
 #: Marks of nodes that have colours of their own, and their sizes as shares of a circle's; others are circles.
@@ -67,9 +69,14 @@ class WeightRange(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The size, or its range."""
-        ends = dict.fromkeys(f"{x:.3g}" for x in (self.least, self.arrow.size))
-        return "\N{EN DASH}".join(ends)
+        """The weight, or its range from the least size on."""
+        ends = dict.fromkeys(signed(self.arrow.sign * x) for x in (self.least, self.arrow.size))
+        return "\N{HORIZONTAL ELLIPSIS}".join(ends)
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """The range of the size."""
+        return self.least, self.arrow.size
 
 
 @styled
@@ -83,7 +90,7 @@ def plot_graph(
     """Draw the signed digraph ``(V, E, W)``: an arrow from ``j`` to ``k`` where ``w_kj != 0``, so that ``k`` listens.
 
     Solid arrows come from allies (``w_kj > 0``), dashed ones from opponents; two opposite ones of the same weight are
-    one with two heads. Where weights differ, ``|w_kj|`` is written at up to 24 arrows, and told by widths. Nodes have
+    one with two heads. Where ``|w_kj|`` differ, weights are written at up to 24 arrows, and told by widths. Nodes have
     the colours of their camps, of a certificate those of states at ``T``, as at a glance; leaders are outlined, and a
     grey ground lies under each group of several, the closed strong components. The layout is the same in every run.
 
@@ -103,8 +110,8 @@ def plot_graph(
     ax : Axes, optional
         Several modes are drawn on parts of it.
     colours : sequence of N colours, optional
-        Of the nodes, in place of those of their camps: the second camp is then drawn as squares, unbalanced leaders as
-        diamonds, and the legend tells these alone.
+        Of the nodes, in place of those of their camps: the second camp is then drawn as squares, with its followers
+        where all edges keep the camps, unbalanced leaders as diamonds, and the legend tells these alone.
     delays : mapping of (source, target) to number, optional
         How late is what is heard over each edge of one graph, in units of time: written at its arrow in place of the
         weight, which its width tells. By default those of a certificate whose messages have delays of their own.
@@ -117,7 +124,7 @@ def plot_graph(
     --------
     >>> ax = plot_graph([("a", "b", 1), ("b", "a", 1), ("b", "c", -2)])
     >>> [text.get_text() for text in ax.texts]
-    ['a', 'b', 'c', '1', '2']
+    ['a', 'b', 'c', '1', '\u22122']
     >>> ax = plot_graph([("a", "b", 1, 2), ("b", "c", -1, 0)])
     >>> [text.get_text() for text in ax.texts][:3], len(ax.texts)
     (['a', 'b', 'c'], 5)
@@ -146,7 +153,9 @@ def plot_graph(
         draw_ground(ax, graph, layout.place, nodes, layout.radius)
     if groups and colours is None:
         ax.fill([], [], color=GROUND, label="leader group")
-    boxes = _draw_mode(ax, structure, camp_groups(structure), edges, bends, layout, colours=colours)
+    camps = None if colours is None else family_camps(Family.from_graph(graph))
+    groups_of = camp_groups(structure) if camps is None else camps
+    boxes = _draw_mode(ax, structure, groups_of, edges, bends, layout, colours=colours)
     finished(ax, "", "", told)
     if own_axes:
         fit_height(ax, boxes, layout.radius)
@@ -225,7 +234,9 @@ def _layout(
     """Lay out arrows in a room in points, and bend them; a flat drawing takes less height."""
     n, inside = len(labels), max(map(columns, labels)) <= INSIDE
     radius = float(np.clip(32 / np.sqrt(n), 7.5 if n <= FREE_NODES else 6.3, 10)) if inside else 4.5
-    margin = np.array([4 * radius if inside else 60, 4 * radius])  # for labels
+    if n <= BESIDE_NODES:  # arrows are to be seen on a slide, too
+        radius = min(radius, room.min() / _RADII)
+    margin = np.array([4 * radius] * 2 if inside else [min(60, 0.45 * room[0]), 30])  # for labels
     place, bends = places_and_bends(arrows, part, radius, tuple(room - margin))
     high = min(room[1], float(np.ptp(place[:, 1])) + margin[1] + 20)  # for bent arrows, and labels
     return _Layout(labels, place, radius, inside, np.array([room[0], high])), bends
@@ -248,7 +259,7 @@ def _draw_mode(
     else:
         _draw_coloured(ax, place, radius, groups, structure.leaders, colours)
     among = among or edges
-    differ, largest = len({edge.text for edge in among}) > 1, max((edge.arrow.size for edge in among), default=1.0)
+    differ, largest = len({edge.size for edge in among}) > 1, max((edge.arrow.size for edge in among), default=1.0)
     late = any(edge.late for edge in edges)
     texts = [edge.late if late else edge.text * differ for edge in edges]
     if late:
@@ -343,7 +354,8 @@ def _draw_coloured(
         ax.plot([], [], "o", color="white", markersize=6, label="leads", **outline)
     for name, (marker, _) in _SHAPES.items():
         if (groups == name).any():
-            ax.plot([], [], marker, color=BEHIND, markersize=6, label=name)
+            whose = " of leaders" if name == "second camp" and (groups == "followers").any() else ""
+            ax.plot([], [], marker, color=BEHIND, markersize=6, label=name + whose)
 
 
 def _draw_arrows(
@@ -366,9 +378,9 @@ def _draw_arrows(
     for sign, (colour, line, name) in EDGE_STYLES.items():
         if any(edge.arrow.sign == sign for edge in edges):
             ax.plot([], [], color=colour, linestyle=line, linewidth=1.1, label=name)
-    uncertain = {edge.text for edge in edges if edge.least < edge.arrow.size}
-    if uncertain:
-        alone = f": {uncertain.pop()}" if len({edge.text for edge in edges}) == 1 else ""
+    if any(edge.least < edge.arrow.size for edge in edges):
+        ranges = sorted({edge.text for edge in edges}, key=len)
+        alone = f": {', '.join(ranges)}" if len({edge.size for edge in edges}) == 1 else ""
         ax.plot([], [], color="black", alpha=0.3, linewidth=4, label=f"uncertain weight{alone}")
     if any(not edge.least for edge in edges):
         ax.plot([], [], color="black", linestyle=":", linewidth=1.1, label="may fail")

@@ -36,6 +36,8 @@ from ptcc_certify.simulation.agents import AgentsTrajectory
 _NAMES = ("position", "velocity", "acceleration")
 #: How far a name stands from the mark that it names, in points.
 _AWAY = 8
+#: Agents whose ends are named as well as their starts.
+_NAMED_ENDS = 12
 
 
 def agents_run(subject: Any) -> AgentsTrajectory:
@@ -174,24 +176,30 @@ def plot_formation(subject: Any, *, ax: Axes | None = None) -> Axes:
         ax.plot(x[-1], y[-1], "o", markersize=4.5, color=color, zorder=5, gid=node_id(k, "end"))
     ax.set_aspect("equal", adjustable="datalim")
     if run.graph.n_nodes <= 2 * NAMED_AGENTS:
-        _name_starts(ax, run)
+        _name_ways(ax, run)
     for face, name in (("white", "at $t = 0$"), (BEHIND, "at $t = T$")):
         ax.plot([], [], "o", markersize=4, markerfacecolor=face, markeredgecolor=BEHIND, label=name)
     return finished(ax, "$x$", "$y$")
 
 
-def _name_starts(ax: Axes, run: AgentsTrajectory) -> None:
-    """Write every agent's name beside the start of its way, on the side where ways, marks and names are farthest."""
+def _name_ways(ax: Axes, run: AgentsTrajectory) -> None:
+    """Write every agent's name beside the start of its way, on the side where ways, marks and names are farthest.
+
+    Of few agents, beside its end too, if it moves.
+    """
     ends, begins = run.positions[:, :, -1], run.positions[:, :, 0]
     points = 72 * min(SINGLE_COLUMN) * 0.8
     unit = float(np.ptp(np.vstack([ends, begins]), axis=0).max() or 1) * 1.1 / points  # of data, for one point of print
     sides = [np.array([math.cos(a), math.sin(a)]) * _AWAY for a in np.arange(16) * math.pi / 8]
     taken: list[np.ndarray] = [*np.moveaxis(run.positions, 1, -1).reshape(-1, 2)]
-    for k, begin in enumerate(begins):
+    named = list(enumerate(begins))
+    if len(begins) <= _NAMED_ENDS:
+        named += [(k, end) for k, end in enumerate(ends) if np.hypot(*(end - begins[k])) > 2 * _AWAY * unit]
+    for k, place in named:
         others = np.array(taken)
-        free = [float(np.hypot(*(others - begin - unit * side).T).min()) for side in sides]
+        free = [float(np.hypot(*(others - place - unit * side).T).min()) for side in sides]
         side = sides[int(np.argmax(np.round(free, 9)))]
-        taken.append(begin + unit * side)
+        taken.append(place + unit * side)
         name = shorten_text(printable(run.graph.labels[k]), 12)
         how: dict[str, Any] = {"textcoords": "offset points", "fontsize": NAME_SIZE, "ha": "center", "va": "center"}
-        ax.annotate(name, (begin[0], begin[1]), (side[0], side[1]), zorder=6, **how).set_path_effects([*HALO])
+        ax.annotate(name, (place[0], place[1]), (side[0], side[1]), zorder=6, **how).set_path_effects([*HALO])

@@ -22,6 +22,7 @@ from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullFormatt
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.io.files import refuse_no_path
+from ptcc_certify.graphs.rationals import MINUS
 from ptcc_certify.report.plots.sizes import SINGLE_COLUMN, current_sizes
 from ptcc_certify.report.plots.subject import read_back
 
@@ -40,6 +41,18 @@ _TITLE = 22
 _OF_STATES = ("state ", "position", "sliding variable", r"$\max_k |x_k(t)")
 #: Between ticks lie these numbers of units, times a power of ten.
 STEPS = [1, 2, 2.5, 5, 10]
+
+
+def signed(x: float, digits: int = 3) -> str:
+    """Return a number as the ticks of an axis are written, with the sign of minus.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.style import signed
+    >>> print(signed(-0.5), signed(2))
+    \u22120.5 2
+    """
+    return f"{x + 0.0:.{digits}g}".replace("-", MINUS)
 
 
 def styled(plot: Callable[..., Any]) -> Callable[..., Any]:
