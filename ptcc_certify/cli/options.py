@@ -20,7 +20,6 @@ from ptcc_certify.cli import click_options as declared
 from ptcc_certify.cli.scenario import graph_of, is_scenario, kind_of_protocol, read_scenario, takes_one_graph
 from ptcc_certify.errors import Change, ParameterError
 from ptcc_certify.graphs.declared_option import options_of
-from ptcc_certify.graphs.labels import first_five
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import PREJUDICE, STUBBORN, Reading, option_flags
 from ptcc_certify.graphs.recognised_files import TOML, kind_of, refuse_as_certificate, refuse_as_graph, shell_word
@@ -340,6 +339,7 @@ def initial_state_of(options: Options, graph: SignedDigraph, within: Fraction | 
 
 def with_prejudices(rows: Sequence[Any], options: Options, graph: SignedDigraph) -> Sequence[Any]:
     """Return rows of numbers of each agent, with those of prejudices that ``--prejudice`` tells."""
+    from ptcc_certify.graphs.labels import first_five
     from ptcc_certify.graphs.stubborn import prejudices, told_by_agent
 
     if options.get("prejudice") is None:

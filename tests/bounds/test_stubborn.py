@@ -15,6 +15,7 @@ from flint import fmpq, fmpq_mat
 from generators import all_classes, random_graph, smallest
 
 import ptcc_certify as ptcc
+from ptcc_certify.bounds.final_state.opinions import disagreement, polarisation
 from ptcc_certify.errors import GraphError, ParameterError, UnknownAgentError
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.graphs.stubborn import prejudices, stubborn_text, stubbornness
@@ -90,6 +91,31 @@ def test_an_agent_that_is_not_reached_from_a_prejudice_stays_out_of_the_formula(
     """3 hears a stubborn agent and an ordinary leader: what 3 ends at is no function of prejudices alone."""
     graph = ptcc.SignedDigraph.from_edges([(1, 3, 1), (2, 3, 1)]).with_stubborn({"1": 1})
     assert ptcc.final_state(graph, {"1": 0, "2": 5, "3": 9, "1's prejudice": 1})["3"] == 3
+
+
+def test_four_people_end_where_friedkin_and_johnsen_print_it() -> None:
+    """The packaged example has prejudices as leaders u1, u2 and u4."""
+    known = ptcc.as_graph(Path(ptcc.__file__).parent / "examples" / "published" / "four_people.csv")
+    people = known.without_nodes("u1", "u2", "u4")
+    debate = people.with_stubborn({"1": "0.22", "2": "0.215", "4": "0.286"})
+    end = ptcc.final_state(debate, {"1": 25, "2": 25, "3": 75, "4": 85})
+    assert [round(float(end[k])) for k in "1234"] == [60, 60, 75, 75]
+    old = ptcc.final_state(known, {"1": 25, "2": 25, "3": 75, "4": 85, "u1": 25, "u2": 25, "u4": 85})
+    assert all(end[k] == old[k] for k in "1234")
+
+
+def test_polarisation_and_disagreement_are_of_agents_alone() -> None:
+    graph = ptcc.as_graph(StringIO(TEAM))
+    debate = graph.with_stubborn({"ann": "0.5", "dan": 1})
+    begin, end = ptcc.as_state([5, 2, 4, -1], debate), ptcc.final_state(debate, [5, 2, 4, -1]).states
+    assert [polarisation(graph, x[:4]) for x in (begin, end)] == [polarisation(debate, x) for x in (begin, end)]
+    assert polarisation(graph, [5, 2, 4, -1]) == Fraction(21, 4)
+    assert disagreement(debate, begin) == disagreement(graph, [5, 2, 4, -1]) == 2 * 9 + 2 * 36 + 2 * 25
+    said = "opinions   from x(T): polarisation 5.25 -> 17.96, disagreement 140 -> 6.4"
+    asked = ("certify", "team.csv", "--stubborn", "ann=0.5,dan=1", "--x0", "5,2,4,-1", "--no-simulation")
+    assert said in command(*asked).out
+    for more in (("--delay", "0.01"), ("--offsets", "1,2,3,4")):
+        assert "polarisation" not in command(*asked, *more).out  # x(T) is another then, or holds without limits
 
 
 def test_entries_of_prejudices_may_be_left_out_of_every_state() -> None:
@@ -233,3 +259,14 @@ def test_stubborn_agents_go_with_whatever_goes_with_leaders(words: tuple[str, ..
     )
     assert run.code == 0, run.err
     assert command("check", "c.json", "team.csv", "--stubborn", "ann=1").code == 0
+
+
+def test_names_of_prejudices_are_drawn_in_rows_that_keep_off_the_runs() -> None:
+    cert = ptcc.certify(ptcc.as_graph(StringIO(TEAM)).with_stubborn("ann=0.5,dan=1"), PROTOCOL, [5, 2, 4, -1])
+    figure = ptcc.plot_glance(cert).figure
+    figure.canvas.draw()
+    texts = {text.get_text(): text for ax in figure.axes for text in ax.texts}
+    for label in ("ann's\nprejudice", "dan's\nprejudice"):
+        box = texts[label].get_window_extent()
+        others = [ax.get_tightbbox() for ax in figure.axes if ax is not texts[label].axes]
+        assert box.x0 >= 0 and not any(box.overlaps(other) for other in others)
