@@ -257,7 +257,8 @@ def reading_of(options: Options) -> dict[str, Any]:
 def reading_words(options: Options) -> list[str]:
     """Return how a graph is read, as words of the command line."""
     way = [] if options["edges"] is None else ["--edges", options["edges"]]
-    return way + [word for flag in option_flags(options) for word in flag.split(" ", 1)]
+    stubborn = [] if options.get("stubborn") is None else ["--stubborn", options["stubborn"]]
+    return way + [word for flag in option_flags(options) for word in flag.split(" ", 1)] + stubborn
 
 
 def protocol_of(options: Options, disturbed: tuple[str, ...] = ("delta",)) -> Protocol:

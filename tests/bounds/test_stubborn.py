@@ -236,6 +236,17 @@ def test_what_is_no_prejudice_is_refused_by_its_flag(case: str) -> None:
     assert run.code == 2 and message in run.err and run.err.count("\n") == 1, run.err
 
 
+def test_the_command_that_design_prints_names_who_is_stubborn() -> None:
+    asked = ("--stubborn", "ann=0.5", "--prejudice", "ann=3", "--agents", "2", "--x0", "1,2,3,4", "--deadline", "3")
+    told = " ".join(command("design", "team.csv", *asked, "--max-input", "1000").out.replace("\\\n", " ").split())
+    printed = told.partition("ptcc certify ")[2].split()
+    assert "--stubborn ann=0.5" in " ".join(printed) and "--prejudice ann=3" in " ".join(printed)
+    run = command("certify", *printed)
+    assert run.code == 0 and "ann's prejudice=3" in run.out
+    alone = command("design", "team.csv", *asked[:4], "--max-input", "1000", "--initial-bound", "5", "--deadline", "3")
+    assert alone.code == 2 and "--prejudice: is not searched for single integrators" in alone.err
+
+
 def test_a_command_of_one_graph_takes_no_interval_of_stubbornness() -> None:
     run = command("influence", "team.csv", "--stubborn", "ann=1..2")
     assert run.code == 2 and "an interval makes a family; ptcc influence takes one graph" in run.err
