@@ -111,6 +111,9 @@ def _weights_by_agent(stubborn: Any, labels: Sequence[str]) -> dict[str, tuple[F
     named = by_label(stubborn, "stubborn")
     if named is None:
         texts = isinstance(stubborn, str | os.PathLike)
+        if not texts and (stubborn is None or hasattr(stubborn, "__len__")):
+            mend = 'give {"a": 0.5}, or one number for all'
+            raise ParameterError("stubborn", f"= {shorten(repr(stubborn))} does not tell of which agents; {mend}")
         named = told_by_agent(stubborn, labels, "stubborn") if texts else dict.fromkeys(labels, stubborn)
     if not named:
         raise ParameterError("stubborn", "names nobody; give a=0.5, or leave it out")
@@ -141,7 +144,10 @@ def told_by_agent(text: str | os.PathLike[str], labels: Sequence[str], name: str
             raise ParameterError(name, f"of {file}: {shorten(','.join(odd))} is no row node,number; write a,0.5")
         pairs = [(label, number) for label, number in rows]
     else:
-        items = next(csv.reader([text], skipinitialspace=True), [])
+        try:
+            items = next(csv.reader([text], skipinitialspace=True, strict=True), [])
+        except csv.Error as error:
+            raise ParameterError(name, f"has unclear quotes or rows ({error}); write a=0.5,b=1") from None
         if "=" not in text and len(items) == 1 and not text.strip()[:1].isalpha():
             return dict.fromkeys(labels, text.strip())
         if bare := next((item for item in items if "=" not in item), None):

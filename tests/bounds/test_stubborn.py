@@ -163,6 +163,8 @@ BAD = {
     "three ends": ({"a": (1, 2, 3)}, "has 3 numbers"),
     "twice": ("a=1,a=2", "names an agent twice"),
     "half": ("a=1,2", 'has "2", which is not label=number'),
+    "a list": ([0.5, 1], "does not tell of which agents"),
+    "two rows": ("a=1\nb=2", "has unclear quotes or rows"),
     "no file": ("theta.csv", 'has "theta.csv", which is not label=number; write a=0.5'),
 }
 
