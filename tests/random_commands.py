@@ -358,6 +358,14 @@ def design(draw: Draw) -> tuple[int, list[str], dict[str, str]]:
     return graph.n_nodes, command, files
 
 
+def stubborn(draw: Draw) -> tuple[int, list[str], dict[str, str]]:
+    """Return a command of another kind, on whose graph some agents are stubborn, or all."""
+    n, command, files = KINDS[draw.choice([kind for kind in KINDS if kind not in ("stubborn", "restricted")])](draw)
+    theta = draw.choice([draw.number(0.01, 10), draw.number(0.01, 10), "0.3..0.5"])
+    first = next(iter(files.values())).splitlines()[1]  # nodes stand before edges
+    return n, [*command, "--stubborn", draw.choice([theta, f"{first}={theta}", f"{first}={theta}"])], files
+
+
 KINDS: dict[str, Callable[[Draw], tuple[int, list[str], dict[str, str]]]] = {
     "nominal": nominal,
     "sliding mode": sliding_mode,
@@ -369,6 +377,7 @@ KINDS: dict[str, Callable[[Draw], tuple[int, list[str], dict[str, str]]]] = {
     "beside": beside,
     "vehicles": vehicles,
     "design": design,
+    "stubborn": stubborn,
 }
 
 

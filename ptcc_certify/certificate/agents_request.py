@@ -15,7 +15,7 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import as_family, as_graph
 from ptcc_certify.graphs.io.conversion import is_family
-from ptcc_certify.graphs.io.states import as_states, random_states
+from ptcc_certify.graphs.io.states import as_states, draw_states
 from ptcc_certify.graphs.rationals import shorten, writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.model.agents import DERIVATIVES, MOST_DIMENSION, MOST_TRACKING, PLURALS, Agents
@@ -240,7 +240,7 @@ def _states(values: Any, graph: SignedDigraph, name: str, dimension: int | None 
     """Return N rows of d numbers, or refuse them."""
     rows: Sequence[Sequence[Fraction]]
     if isinstance(values, str) and values.strip() == "random" and name != "x0":
-        rows = random_states([0, 2], graph.n_nodes, dimension or 1)
+        rows = draw_states([0, 2], graph, name, dimension or 1)
     else:
         rows = as_states(values, graph, name)
     if dimension is not None and len(rows[0]) != dimension:

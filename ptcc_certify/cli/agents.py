@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from lmi.exact.decimal_rounding import counted
 from ptcc_certify.cli import click_options as declared
-from ptcc_certify.cli.options import Options, read_initial_state
+from ptcc_certify.cli.options import Options, read_initial_state, with_prejudices
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.model.agents import Agents
@@ -124,7 +124,7 @@ def agents_and_states(
     ]
     while later and later[-1] is None:
         later.pop()
-    x0 = read_vectors(options["x0"], options["seed"], graph, d, "--x0")
+    x0 = with_prejudices(read_vectors(options["x0"], options["seed"], graph, d, "--x0"), options, graph)
     told = later or any(text is not None for text in given)
     return agents, InitialState(x0, derivatives=later if told else None)
 
@@ -277,19 +277,23 @@ def run_of_agents(case: Case, samples: int, steps: int | None, **pattern: Any) -
 
 def read_vectors(text: str, seed: Any, graph: SignedDigraph, dimension: int, name: str) -> Any:
     """Return N rows of ``dimension`` exact numbers: agent after agent, of a file ``node,x,y``, or random."""
-    from ptcc_certify.graphs.io.states import random_states, read_vectors_of_file
+    from ptcc_certify.graphs.io.states import draw_states, read_vectors_of_file, still_of
+    from ptcc_certify.graphs.stubborn import agent_nodes, completed
 
     if text == "random":
-        return random_states(seed, graph.n_nodes, dimension)
+        return draw_states(seed, graph, name, dimension)
     if dimension == 1:
         return [[x] for x in read_initial_state(text, seed, graph, name)]
     if os.path.isfile(text):  # noqa: PTH113 - that of Path refuses texts that are longer than the names of files
-        return read_vectors_of_file(text, graph, dimension)
+        return read_vectors_of_file(text, graph, dimension, still_of(name))
     texts = text.split(",")
-    if len(texts) != graph.n_nodes * dimension:
+    agents = len(agent_nodes(graph))
+    if len(texts) not in (agents * dimension, graph.n_nodes * dimension):
         raise ParameterError(
-            f"{name} has {counted(len(texts), 'value')} for {counted(graph.n_nodes, 'agent')} of dimension "
-            f"{dimension}; give {graph.n_nodes * dimension} numbers, agent after agent, or a file node,x,y"
+            f"{name} has {counted(len(texts), 'value')} for {counted(agents, 'agent')} of dimension "
+            f"{dimension}; give {agents * dimension} numbers, agent after agent, or a file node,x,y"
         )
     numbers = [declared.exact_number(text, name) for text in texts]
-    return [numbers[k : k + dimension] for k in range(0, len(numbers), dimension)]
+    still = still_of(name)
+    rows = [numbers[k : k + dimension] for k in range(0, len(numbers), dimension)]
+    return completed(rows, graph, None if still is None else [still] * dimension)

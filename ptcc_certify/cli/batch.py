@@ -29,7 +29,7 @@ def _refuse_scenarios(context: click.Context, parameter: click.Parameter, patter
 
 @click.command(cls=Command)
 @click.argument("pattern", nargs=-1, required=True, callback=_refuse_scenarios, type=click.Path())
-@shared.reading_options
+@shared.plain_reading_options
 @shared.protocol_options
 @shared.expect_option("E.g. stability; exit code 3 if it does not follow for some graph.")
 @one_of(Expectations, "min_rate", help="Ask for a proved rate of at least R of every graph.")

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 @click.command(cls=Command)
 @shared.graphs_argument
 @shared.protocol_options
+@shared.prejudice_option
 @shared.output_option
 @shared.json_option
 @screen_options
@@ -135,7 +136,7 @@ def _case_of(
     sigma0 = shared.sigma0_of(protocol, options, one)
     agents, initial = of_agents.agents_and_states(options, one, certified=True)
     if initial is None:
-        initial = InitialState(shared.read_initial_state(options["x0"], options["seed"], one))
+        initial = InitialState(shared.initial_state_of(options, one))
     limits = shared.limits_of(options) if options["kind"] == "nominal" else ()
     if agents is not None and not family:
         more = any(limit.stop_before is not None or limit.sample_period is not None for limit in limits)

@@ -16,7 +16,7 @@ from ptcc_certify.errors import ParameterError, PTCCError, did_you_mean
 from ptcc_certify.gain_design.request import DesignRequest
 from ptcc_certify.graphs.declared_option import Option, options_of
 from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.graphs.reading import OPTIONAL, UNCERTAINTY, Reading
+from ptcc_certify.graphs.reading import OPTIONAL, PREJUDICE, STUBBORN, UNCERTAINTY, Reading
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.asks import Asks, Expectations
@@ -78,10 +78,12 @@ OF_FAMILIES = (
 DECLARED = (
     FILE,
     *options_of(Reading).values(),
+    STUBBORN,
     *OF_FAMILIES,
     KIND,
     *options_of(NominalProtocol, SlidingModeProtocol, Agents, InitialState).values(),
     A0,
+    PREJUDICE,
     *options_of(Run, Asks).values(),
     DIMENSION,
     *options_of(GainLimits, LateMessages, MovingLeaders, Expectations, DesignRequest).values(),
@@ -277,7 +279,7 @@ class Command(click.Command):
         *("kind", "T", "rho1", "rho2", "kappa", "x0", "seed", "edges", "switching", "expect", "what", "stdlib"),
         *("verified", "workers", "restart", "output", "as_json", "verbose", "port", "no_browser"),
     )
-    few: ClassVar[int] = 16
+    few: ClassVar[int] = 17
 
     def get_help_option(self, ctx: click.Context) -> click.Option | None:
         """Return ``--help``, which takes a topic where there are many options."""

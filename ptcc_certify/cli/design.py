@@ -34,8 +34,8 @@ _NOT_SEARCHED, _OF_AGENTS = ("gain_cap", "stop_before", "sample_period", "delta"
 #: Sliding terms, which are kept.
 _SLIDING = ("mu1", "mu2", "mu3", "delta")
 #: shared.Options of this command that need ``--agents``, and those that say what the agents are and where they begin.
-_OWN = ("kind", *_SLIDING, "x0", "seed", "gain_cap", "dimension")
-_OF_STATES = ("plant", "drag", "rest", "cascade", "x0", "v0", "a0", "offsets", "biases", "dimension")
+_OWN = ("kind", *_SLIDING, "x0", "prejudice", "seed", "gain_cap", "dimension")
+_OF_STATES = ("plant", "drag", "rest", "cascade", "x0", "v0", "a0", "offsets", "biases", "dimension", "prejudice")
 #: What is searched: the gains that a deadline ``T = 1`` would have, whose deadline is then sought.
 _TEMPLATE = {"T": None, "T_r": None, "T_s": None, "rho1": "0.001", "rho2": "1", "kappa": "1"}
 
@@ -45,6 +45,7 @@ _EXAMPLE_OF_AGENTS = "ptcc design fig1a --agents double-integrator --max-input 3
 template_options = together(
     shared.kind_option("Agents: nominal, or sliding mode, which disturbances within --delta do not move."),
     one_of(InitialState, "x0", default="random", help="Agents: initial positions, as of ptcc certify."),
+    shared.prejudice_option,
     one_of(Run, "seed", help="Agents: seed of random initial states."),
     *(
         one_of(SlidingModeProtocol, name, shown=default, help=f"Agents, sliding mode: {text}")

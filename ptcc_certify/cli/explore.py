@@ -19,7 +19,7 @@ from ptcc_certify.graphs.recognised_files import refuse_as_graph
 
 @click.command(cls=shared.OneGraph)
 @click.argument("graph", default="fig3a")
-@shared.reading_options
+@shared.plain_reading_options
 @click.option("--port", type=click.IntRange(1, 65535), default=8730, help="Where to listen; the next one, if taken.")
 @click.option("--no-browser", is_flag=True, help="Print the address only.")
 def explore(graph: str, port: int, no_browser: bool, **options: Any) -> int:

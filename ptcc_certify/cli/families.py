@@ -133,16 +133,19 @@ def read_graph_or_family(graphs: tuple[str, ...], options: shared.Options) -> Si
 
 def graph_or_family(files: Sequence[Any], options: shared.Options) -> SignedDigraph | Family:
     """Return the family of files, read as the options say, or the graph where there is one, with known weights."""
+    from ptcc_certify.graphs.family import Family
     from ptcc_certify.graphs.io import read_family
     from ptcc_certify.graphs.io.interval_rows import is_family_file
 
-    uncertain = options["uncertainty"] is not None or options["optional"]
-    if len(files) == 1 and not uncertain and not is_family_file(files[0]):
-        return shared.read(files[0], options)
-    family = read_family(files, **family_keywords(options))
-    if family.graph is None:
-        return family
-    return shared.read(files[0], options) if not is_family_file(files[0]) else family.graph
+    uncertain, of_intervals = options["uncertainty"] is not None or options["optional"], is_family_file(files[0])
+    one = len(files) == 1 and not uncertain and not of_intervals
+    family = None if one else read_family(files, **family_keywords(options))
+    graph = None if family is None else family.graph
+    if one or (graph is not None and not of_intervals):
+        graph = shared.read_alone(files[0], options)
+    if graph is not None and not isinstance(alone := shared.with_stubborn(graph, options), Family):
+        return alone
+    return shared.with_stubborn(family or read_family(files, **family_keywords(options)), options)
 
 
 def family_keywords(options: shared.Options) -> dict[str, Any]:

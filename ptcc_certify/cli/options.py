@@ -20,7 +20,8 @@ from ptcc_certify.cli import click_options as declared
 from ptcc_certify.cli.scenario import graph_of, is_scenario, kind_of_protocol, read_scenario, takes_one_graph
 from ptcc_certify.errors import Change, ParameterError
 from ptcc_certify.graphs.declared_option import options_of
-from ptcc_certify.graphs.reading import Reading, option_flags
+from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.reading import PREJUDICE, STUBBORN, Reading, option_flags
 from ptcc_certify.graphs.recognised_files import TOML, kind_of, refuse_as_certificate, refuse_as_graph, shell_word
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.asks import Asks, Expectations
@@ -31,6 +32,7 @@ from ptcc_certify.model.run import Run
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.graphs.digraph import SignedDigraph
+    from ptcc_certify.graphs.family import Family
     from ptcc_certify.model import Protocol
 
 #: What the commands are given, by the names of their parameters.
@@ -103,7 +105,10 @@ def expect_option(text: str) -> declared.Decorator:
     return declared.one_of(Expectations, "behaviour", callback=_behaviour, help=text)
 
 
-reading_options = declared.options_for(Reading)
+#: How graphs are read, and who is stubborn in them; the former alone.
+plain_reading_options = declared.options_for(Reading)
+reading_options = declared.together(plain_reading_options, declared.click_option(STUBBORN))
+prejudice_option = declared.click_option(PREJUDICE)
 #: GRAPH, or SCENARIO.toml, whose other keys become defaults of the options; hence it is read before these.
 graph_argument = click.argument(
     "graph", metavar="GRAPH|SCENARIO.toml", is_eager=True, callback=graph_of, type=click.Path()
@@ -215,11 +220,27 @@ def graph_file(graph: str) -> Any:
 
 
 def read(graph: Any, options: Options) -> SignedDigraph:
-    """Read GRAPH, or a file object, as the options say."""
+    """Read GRAPH, or a file object, as the options say, stubborn agents included."""
+    from ptcc_certify.graphs.family import Family
+
+    given = with_stubborn(read_alone(graph, options), options)
+    if isinstance(given, Family):
+        command = click.get_current_context().command.name
+        raise ParameterError(f"--stubborn: an interval makes a family; {takes_one_graph(command)}; give one number")
+    return given
+
+
+def read_alone(graph: Any, options: Options) -> SignedDigraph:
+    """Read GRAPH, or a file object, as the options say, without prejudices of stubborn agents."""
     from ptcc_certify.graphs.io import read_graph
 
     file = graph_file(graph) if isinstance(graph, str) else graph
     return read_graph(file, **reading_of(options))
+
+
+def with_stubborn(given: SignedDigraph | Family, options: Options) -> SignedDigraph | Family:
+    """Return a graph or a family with the prejudices of the agents that ``--stubborn`` names."""
+    return given if options.get("stubborn") is None else given.with_stubborn(options["stubborn"])
 
 
 def reading_of(options: Options) -> dict[str, Any]:
@@ -236,7 +257,8 @@ def reading_of(options: Options) -> dict[str, Any]:
 def reading_words(options: Options) -> list[str]:
     """Return how a graph is read, as words of the command line."""
     way = [] if options["edges"] is None else ["--edges", options["edges"]]
-    return way + [word for flag in option_flags(options) for word in flag.split(" ", 1)]
+    stubborn = [] if options.get("stubborn") is None else ["--stubborn", options["stubborn"]]
+    return way + [word for flag in option_flags(options) for word in flag.split(" ", 1)] + stubborn
 
 
 def protocol_of(options: Options, disturbed: tuple[str, ...] = ("delta",)) -> Protocol:
@@ -310,6 +332,31 @@ def limits_of(options: Options) -> tuple[GainLimits, ...]:
     return () if actuator is None else (actuator,)
 
 
+def initial_state_of(options: Options, graph: SignedDigraph, within: Fraction | None = None) -> list[Fraction]:
+    """Return the initial state that ``--x0`` and ``--prejudice`` give, or draw one, of size ``within`` at most."""
+    state = read_initial_state(options["x0"], options["seed"], graph, within=within)
+    return [row[0] for row in with_prejudices([[x] for x in state], options, graph)]
+
+
+def with_prejudices(rows: Sequence[Any], options: Options, graph: SignedDigraph) -> Sequence[Any]:
+    """Return rows of numbers of each agent, with those of prejudices that ``--prejudice`` tells."""
+    from ptcc_certify.graphs.labels import first_five
+    from ptcc_certify.graphs.stubborn import prejudices, told_by_agent
+
+    if options.get("prejudice") is None:
+        return rows
+    nodes = {graph.labels[agent]: node for node, agent in prejudices(graph).items()}
+    if not nodes:
+        raise ParameterError("--prejudice is of stubborn agents; name them by --stubborn, or leave it out")
+    if len(rows[0]) > 1:
+        raise ParameterError('--prejudice: is one number; of vectors give rows "a\'s prejudice,x,y" of --x0 FILE.csv')
+    told = told_by_agent(options["prejudice"], [*nodes], "--prejudice")
+    if odd := next((label for label in told if label not in nodes), None):
+        raise ParameterError(f"--prejudice: {shorten(odd)} is not stubborn; stubborn are {first_five([*nodes])}")
+    numbers = {nodes[label]: declared.exact_number(text, "--prejudice") for label, text in told.items()}
+    return [[numbers[k]] if k in numbers else row for k, row in enumerate(rows)]
+
+
 def read_initial_state(
     x0: str, seed: Any, graph: SignedDigraph, name: str = "initial state", within: Fraction | None = None
 ) -> list[Fraction]:
@@ -317,9 +364,9 @@ def read_initial_state(
 
     A random one is at most 10 in size, and at most ``within``.
     """
-    from ptcc_certify.graphs.io import random_states, read_state
+    from ptcc_certify.graphs.io.states import draw_states, read_state
 
     if x0 == "random":
         scale = Fraction(1) if within is None else min(Fraction(1), abs(within) / 10)
-        return [scale * x for (x,) in random_states(seed, graph.n_nodes)]
+        return [scale * x for (x,) in draw_states(seed, graph, name)]
     return read_state(x0, graph, name)

@@ -95,6 +95,7 @@ class _Figure(click.Choice):  # type: ignore[type-arg]  # no generic class befor
 @shared.reading_options
 @families.mode_options
 @shared.protocol_options
+@shared.prejudice_option
 @shared.limit_options
 @shared.random_within_option
 @of_agents.agents_options
@@ -186,7 +187,7 @@ def _of_certificate(path: str, what: str | None, options: shared.Options) -> tup
                 if certificate.of_family
                 else certificate.graph_proof.graph
             )
-            x0 = shared.read_initial_state(options["x0"], options["seed"], one)
+            x0 = shared.initial_state_of(options, one)
             if certificate.proof.offsets is not None:
                 x0 = [x - h for x, h in zip(x0, certificate.proof.offsets, strict=True)]
             question = replace(certificate.question, initial_state=tuple(x0))
@@ -225,7 +226,7 @@ def _of_family(family: Family, what: str, options: shared.Options) -> Family | C
         return family
     protocol = shared.protocol_of(options)
     one = family.modes[0].mandatory
-    x0 = shared.read_initial_state(options["x0"], options["seed"], one)
+    x0 = shared.initial_state_of(options, one)
     if x0 is None:
         raise ParameterError(f"{what} is drawn from an initial state; give one with --x0")
     initial = InitialState(x0, shared.sigma0_of(protocol, options, one))
@@ -250,7 +251,7 @@ def _of_graph(
     places = None if what == "formation" else of_agents.places_of(options, signed, protocol)
     if places is None and (what in OF_AGENTS or of_agents.agents_of(options) is not None):
         return _of_agents(signed, protocol, what, options)
-    x0 = shared.read_initial_state(options["x0"], options["seed"], signed, within=options["initial_bound"])
+    x0 = shared.initial_state_of(options, signed, within=options["initial_bound"])
     if what == "decay":
         if shared.actuator_of(options) is not None:
             raise ParameterError("decay is drawn without limits of the gain; leave them out, or ask for --what states")

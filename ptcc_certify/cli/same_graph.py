@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ptcc_certify.checker import CheckReport
 
 #: Options that tell how files of graphs and families are read.
-READING = (*shared.READING, "uncertainty", "optional")
+READING = (*shared.READING, "stubborn", "uncertainty", "optional")
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,8 @@ def compare(
     else:
         late = isinstance((pair.document.get("messages") or {}).get("latency"), list)
         delays = "; delays are the certificate's own, not compared" if late else ""
-        read = {"graph_read": f"{name}, read {way}: {found.facts['graph_read']}{delays}"}
+        stubborn = "" if options["stubborn"] is None else f" --stubborn {shell_word(options['stubborn'])}"
+        read = {"graph_read": f"{name}, read {way}: {found.facts['graph_read']}{stubborn}{delays}"}
         if found.reason is None:
             return report, found.facts | read
         flags = _flags_that_agree(pair, options)
@@ -114,7 +115,7 @@ class _Pair:
         from ptcc_certify.graphs.io.family_files import family_flags, read_family
 
         meant = certificate_family(self.document["problem"]["graph"], read_side_files(self.document, self.folder))
-        family = read_family(self.files, **family_keywords(options))
+        family: Any = shared.with_stubborn(read_family(self.files, **family_keywords(options)), options)
         facts = {"graph_read": family_flags(family.read, self.graphs[0])}
         order = mode_order(meant, family)
         if order is None:
@@ -128,7 +129,20 @@ class _Pair:
         return Compared(None, facts)
 
     def options_of_sender(self) -> dict[str, Any]:
-        """Return how the certificate says that its graph was read, as options; nothing where it tells anything else."""
+        """Return how the certificate says that its graph was read, who is stubborn included, as options."""
+        from ptcc_certify.certificate.graph_sections import certificate_family, certificate_graph
+        from ptcc_certify.certificate.section_io import read_side_files
+        from ptcc_certify.graphs.stubborn import stubborn_text, stubbornness
+
+        sides = read_side_files(self.document, self.folder)
+        if self.kind == "family":
+            stubborn = stubbornness(certificate_family(self.document["problem"]["graph"], sides))
+        else:
+            stubborn = stubbornness(certificate_graph(self.document, sides))
+        return self._reading_of_sender() | {"stubborn": stubborn_text(stubborn) or None}
+
+    def _reading_of_sender(self) -> dict[str, Any]:
+        """Return how the certificate says that its graph was read; nothing where it tells anything else."""
         from ptcc_certify.graphs.io.family_files import keywords_of
         from ptcc_certify.graphs.io.graph_files import keywords_as
         from ptcc_certify.graphs.io.interval_rows import is_family_file
@@ -167,14 +181,13 @@ def _flags_that_agree(pair: _Pair, options: shared.Options) -> str | None:
 
     What the sender says is tried beside the options of the command line, then alone.
     """
-    if sender := pair.options_of_sender():
-        typed = {name: options[name] for name in _typed()}
-        for told in ({**options, **sender, **typed}, {**options, **sender}):
-            try:
-                if pair.compare(told).reason is None:
-                    return _flags(options, told, pair.files[0]) or None
-            except PTCCError:
-                continue
+    sender, typed = pair.options_of_sender(), {name: options[name] for name in _typed()}
+    for told in ({**options, **sender, **typed}, {**options, **sender}):
+        try:
+            if pair.compare(told).reason is None:
+                return _flags(options, told, pair.files[0]) or None
+        except PTCCError:
+            continue
     return None
 
 

@@ -46,6 +46,7 @@ _TABLES = ("", ".csv", ".txt")
 @shared.graphs_argument
 @shared.reading_options
 @shared.protocol_options
+@shared.prejudice_option
 @shared.limit_options
 @shared.random_within_option
 @families.mode_options
@@ -261,7 +262,7 @@ def _run_beside(
         if messages is None:
             raise ParameterError("--noise: is not simulated with leaders at rest; leave --leader-speed out")
     sigma0 = shared.sigma0_of(protocol, options, signed)
-    x0 = shared.read_initial_state(options["x0"], options["seed"], signed)
+    x0 = shared.initial_state_of(options, signed)
     more: Any = {"messages": messages, "leaders": leaders}
     if messages is not None:
         more["signal"] = (options["age_pattern"], options["seed"])
@@ -288,11 +289,11 @@ def _run(
         from ptcc_certify.simulation.nominal import Bounded
 
         more["noise"] = Bounded("telegraph", options["noise"])
-    x0, seed = options["x0"], options["seed"]
     if options["dimension"] == 1:
-        x0 = shared.read_initial_state(x0, seed, signed, within=options["initial_bound"])
+        x0: Any = shared.initial_state_of(options, signed, within=options["initial_bound"])
     else:
-        x0 = of_agents.read_vectors(x0, seed, signed, options["dimension"], "--x0")
+        x0 = of_agents.read_vectors(options["x0"], options["seed"], signed, options["dimension"], "--x0")
+        x0 = shared.with_prejudices(x0, options, signed)
     return of_agents.run_in_places(signed, protocol, x0, places, times=times, **more)
 
 
@@ -311,7 +312,7 @@ def _run_family(
         flag = "--dimension" if options["dimension"] > 1 else "--boundary-layer"
         raise ParameterError(f"{flag} is for one graph, not for families yet; leave it out")
     signal = "random" if options["signal"] == "any" else options["signal"]  # of a scenario for ptcc certify
-    x0 = shared.read_initial_state(options["x0"], options["seed"], family.modes[0].mandatory)
+    x0 = shared.initial_state_of(options, family.modes[0].mandatory)
     promise = families.dwell_of(options)
     if promise is not None and signal != "random":
         flag = "--dwell" if options["dwell"] is not None else "--clock-dwell"

@@ -278,6 +278,22 @@ class Family(Shown):
         """Return the family on the nodes ``nodes`` (indices, ascending) and the edges among them."""
         return Family(tuple(mode.restricted(nodes) for mode in self.modes), self.notes)
 
+    def with_stubborn(self, stubborn: Any) -> Family:
+        """Return the family in which some agents are stubborn, in every mode: see :meth:`SignedDigraph.with_stubborn`.
+
+        Parameters
+        ----------
+        stubborn : mapping of label to number, pair of numbers or text; number or text
+
+        Examples
+        --------
+        >>> Family.from_intervals([("a", "b", 1, 2)]).with_stubborn("b=0.3..0.5")
+        Family(3 nodes, 2 of 2 weights uncertain)
+        """
+        from ptcc_certify.graphs.stubborn import with_stubborn
+
+        return with_stubborn(self, stubborn)  # type: ignore[return-value]
+
     @cached_property
     def sha256(self) -> str:
         r"""SHA-256 of nodes and modes.
@@ -325,9 +341,10 @@ class Family(Shown):
             mend = "ptcc_certify.as_graph and as_family take other forms"
             raise GraphError(f"{shorten(repr(graph))} is no SignedDigraph; {mend}")
         share = read_share(uncertainty)
-        tied = bool(graph.read.get("undirected"))
         off = np.zeros(graph.n_edges, dtype=bool)
         key = graph.target * graph.n_nodes + graph.source  # ascends
+        both = np.array_equal(np.sort(graph.source * graph.n_nodes + graph.target), key)  # but for edges added or lost
+        tied = bool(graph.read.get("undirected")) and both
         for one in optional:
             off[_edge_number(graph, key, one)] = True
             if tied:

@@ -145,6 +145,20 @@ OPTIONAL = Option(
     kind="text",
     many=True,
 )
+STUBBORN = Option(
+    flag="--stubborn A=THETA,..",
+    help="Stubborn agents, and the weights of their prejudices: numbers or LOW..HIGH; one for all; or FILE.csv",
+    key="graph.stubborn",
+    example='"0.5"',
+    kind="state",
+)
+PREJUDICE = Option(
+    flag="--prejudice A=P,..",
+    help="Prejudices of stubborn agents, where they are not their initial states.",
+    key="initial_state.prejudice",
+    example='"a=1"',
+    kind="state",
+)
 #: The options, in the order of their declaration.
 OPTIONS = tuple(field.name for field in fields(Reading))
 

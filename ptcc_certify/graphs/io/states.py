@@ -22,11 +22,14 @@ from ptcc_certify.graphs.io.files import name_and_ending, read_bytes
 from ptcc_certify.graphs.io.signs import find
 from ptcc_certify.graphs.labels import first_five, labels_beside
 from ptcc_certify.graphs.rationals import MINUS, as_fraction, parse_exact, shorten
+from ptcc_certify.graphs.stubborn import agent_nodes, completed, prejudices
 
 _NODE = ("node", "label", "name", "id")
 _VALUE = ("value", "state", "x", "x0", "sigma0")
 
 
+#: Whose entries of prejudices, where they are not given, are those of their agents; others are 0.
+_SHARED = ("x0", "initial state", "offsets", "low", "high", "center", "axes")
 #: Largest entry of an initial state, in size: final states and trajectories are also reported as floats.
 LARGEST_STATE = Fraction(1e300)  # the float, which exceeds 10^300 a little
 
@@ -92,15 +95,16 @@ def as_states(values: Any, graph: Any, name: str = "x0") -> list[list[Fraction]]
     True
     """
     graph = as_graph(graph)
+    needed = [graph.labels[k] for k in agent_nodes(graph)]
     if isinstance(values, str) and values.strip() == "random":
-        return random_states([0, 1] if name == "sigma0" else 0, graph.n_nodes)  # what the command line draws
+        return draw_states([0, 1] if name == "sigma0" else 0, graph, name)  # what the command line draws
     if isinstance(values, str | os.PathLike):
         try:
-            state = read_state(values, graph)
+            state = _read(values, graph, "initial state", still_of(name))
         except PTCCError as error:
             raise type(error)(f"{name}: {error}") from None
         return [[_checked(x, label, name)] for label, x in zip(graph.labels, state, strict=True)]
-    what, mend = f"the initial state {name}", f"give one number for each of {first_five(graph.labels)}"
+    what, mend = f"the initial state {name}", f"give one number for each of {first_five(needed)}"
     if isinstance(values, set | frozenset | bytes | bytearray):
         raise ParameterError(f"{what} is {shorten(repr(values))}, which has no order; {mend}")
     if np.ma.is_masked(values):
@@ -109,8 +113,10 @@ def as_states(values: Any, graph: Any, name: str = "x0") -> list[list[Fraction]]
     if not isinstance(values, Iterable) or not getattr(values, "ndim", True):
         raise ParameterError(f"{what} is {'missing' if values is None else shorten(repr(values))}; {mend}")
     rows = [list(row) if _is_row(row) else [row] for row in values]
+    still = still_of(name)
+    rows = [*completed(rows, graph, None if still is None else [still] * len(rows[0]) if rows else [])]
     if len(rows) != graph.n_nodes:
-        count = f"{counted(len(rows), 'value')} for {counted(graph.n_nodes, 'agent')}"
+        count = f"{counted(len(rows), 'value')} for {counted(len(needed), 'agent')}"
         raise ParameterError(f"{what} has {count}; {mend}")
     if len({len(row) for row in rows}) > 1 or not rows[0]:
         raise ParameterError(f"{what} has empty rows, or rows of different lengths; give as many numbers to each agent")
@@ -168,8 +174,14 @@ def read_state(
     >>> read_state("5,-0.5", graph) == read_state("b=-1/2, a=5", graph)
     True
     """
+    return _read(text_or_path, graph, name, still_of(name))
+
+
+def _read(
+    text_or_path: str | os.PathLike[str], graph: SignedDigraph, name: str, still: Fraction | None
+) -> list[Fraction]:
     if not isinstance(text_or_path, str) or os.path.isfile(text_or_path):  # noqa: PTH113 - Path.is_file may raise
-        return _state_of_file(text_or_path, graph)
+        return _state_of_file(text_or_path, graph, still)
     place = f'{name} "{shorten(text_or_path)}"'
     try:
         items = items_of(text_or_path) or [""]
@@ -187,12 +199,13 @@ def read_state(
             raise ParameterError(place, message)
         pairs = [item.rpartition("=")[::2] for item in items]
         pairs = [(label if label in graph.index else label.strip(), value) for label, value in pairs]
-    elif len(items) == graph.n_nodes:
+    elif len(items := [*completed(items, graph, None if still is None else "0")]) == graph.n_nodes:
         pairs = list(zip(graph.labels, items, strict=True))
     else:
-        size = f"{counted(len(items), 'value')} for {counted(graph.n_nodes, 'node')}"
-        raise ParameterError(place, f"no such file, and {size}; give one for each of {first_five(graph.labels)}")
-    return _in_node_order([(*pair, place) for pair in pairs], graph, place, ParameterError)
+        needed = [graph.labels[k] for k in agent_nodes(graph)]
+        size = f"{counted(len(items), 'value')} for {counted(len(needed), 'node')}"
+        raise ParameterError(place, f"no such file, and {size}; give one for each of {first_five(needed)}")
+    return _in_node_order([(*pair, place) for pair in pairs], graph, place, ParameterError, still)
 
 
 def _separated_otherwise(text: str, items: Sequence[str], graph: SignedDigraph) -> bool:
@@ -237,6 +250,7 @@ def in_node_order(values: Any, graph: SignedDigraph, name: str = "x0") -> Any:
     entries = by_label(values, name)
     if entries is None:
         return values
+    entries = _with_prejudices(entries, graph, still_of(name))
     missing = [label for label in graph.labels if label not in entries]
     unknown = [label for label in entries if label not in graph.index]
     if missing or unknown:
@@ -303,7 +317,38 @@ def random_states(seed: Any, n: int, dimension: int = 1) -> list[list[Fraction]]
     return [[Fraction(int(x), 1000) for x in row] for row in thousandths]
 
 
-def _state_of_file(path: str | os.PathLike[str], graph: SignedDigraph) -> list[Fraction]:
+def still_of(name: str) -> Fraction | None:
+    """Return what prejudices have of a state where it is not given: 0, or None where they share that of their agents.
+
+    Examples
+    --------
+    >>> still_of("--x0"), still_of("v0")
+    (None, Fraction(0, 1))
+    """
+    return None if name.lstrip("-") in _SHARED else Fraction(0)
+
+
+def draw_states(seed: Any, graph: SignedDigraph, name: str = "x0", dimension: int = 1) -> list[list[Fraction]]:
+    """Draw states of the agents of a graph, as :func:`random_states` does; prejudices are not drawn.
+
+    Examples
+    --------
+    >>> graph = SignedDigraph.from_edges([("a", "b", 1)])
+    >>> draw_states(7, graph) == draw_states(7, graph.with_stubborn("b=2"))[:2]
+    True
+    """
+    still, drawn = still_of(name), random_states(seed, len(agent_nodes(graph)), dimension)
+    return [*completed(drawn, graph, None if still is None else [still] * dimension)]
+
+
+def _with_prejudices(entries: dict[str, Any], graph: SignedDigraph, still: Any) -> dict[str, Any]:
+    """Return entries by label with those of prejudices that are left out."""
+    labels = [(graph.labels[node], graph.labels[agent]) for node, agent in prejudices(graph).items()]
+    added = {p: entries[a] if still is None else still for p, a in labels if p not in entries and a in entries}
+    return entries | added
+
+
+def _state_of_file(path: str | os.PathLike[str], graph: SignedDigraph, still: Fraction | None) -> list[Fraction]:
     name, _ = name_and_ending(path)
     columns: tuple[int, int] | None = None
     pairs, rows = [], Records(read_bytes(path, name), name)
@@ -320,7 +365,7 @@ def _state_of_file(path: str | os.PathLike[str], graph: SignedDigraph) -> list[F
             raise FormatError(f"{place}: a row needs a node and a value; write node,value")
         if cells:
             pairs.append((cells[0], cells[1], place))
-    return _in_node_order(_with_points(pairs, rows.commas), graph, name, FormatError)
+    return _in_node_order(_with_points(pairs, rows.commas), graph, name, FormatError, still)
 
 
 def _with_points(pairs: Sequence[tuple[str, str, str]], commas: bool) -> list[tuple[str, str, str]]:
@@ -328,7 +373,9 @@ def _with_points(pairs: Sequence[tuple[str, str, str]], commas: bool) -> list[tu
     return [(label, value, place) for (label, _, place), value in zip(pairs, values, strict=True)]
 
 
-def read_vectors_of_file(path: str | os.PathLike[str], graph: SignedDigraph, dimension: int) -> list[list[Fraction]]:
+def read_vectors_of_file(
+    path: str | os.PathLike[str], graph: SignedDigraph, dimension: int, still: Fraction | None = None
+) -> list[list[Fraction]]:
     """Read rows ``node,x,y,..`` of so many numbers for each node; the header is optional.
 
     Raises
@@ -347,7 +394,9 @@ def read_vectors_of_file(path: str | os.PathLike[str], graph: SignedDigraph, dim
             raise FormatError(f"{place}: a row needs a node and {dimension} numbers; write node,x,y")
         for entries, text in zip(columns, row[1:], strict=True):
             entries.append((row[0], text, place))
-    states = [_in_node_order(_with_points(entries, rows.commas), graph, name, FormatError) for entries in columns]
+    states = [
+        _in_node_order(_with_points(entries, rows.commas), graph, name, FormatError, still) for entries in columns
+    ]
     return [list(row) for row in zip(*states, strict=True)]
 
 
@@ -365,7 +414,11 @@ def _node_and_value(row: Sequence[str], place: str) -> tuple[int | None, int | N
 
 
 def _in_node_order(
-    pairs: Sequence[tuple[str, str, str]], graph: SignedDigraph, name: str, refusal: type[PTCCError]
+    pairs: Sequence[tuple[str, str, str]],
+    graph: SignedDigraph,
+    name: str,
+    refusal: type[PTCCError],
+    still: Fraction | None,
 ) -> list[Fraction]:
     """Put (label, value, place) in node order."""
     state: dict[str, Fraction] = {}
@@ -380,6 +433,7 @@ def _in_node_order(
         except NumberError as error:
             mend = "write the minus as -" if MINUS in text else "give a finite number"
             raise refusal(place, f"value of node {shorten(label)}: {error}; {mend}") from None
+    state = _with_prejudices(state, graph, still)
     if missing := [label for label in graph.labels if label not in state]:
         count = f"{len(missing)} of {graph.n_nodes} nodes have no value"
         raise refusal(f"{name}: {count}: {first_five(missing)}; give one to each node")

@@ -11,9 +11,11 @@ import numpy as np
 from lmi.exact.decimal_rounding import counted
 from ptcc_certify.certificate.fact import Fact, Facts
 from ptcc_certify.errors import labelled
+from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.io.columns_beside import IGNORED
 from ptcc_certify.graphs.structure import ClosedComponent, Structure, analyse
+from ptcc_certify.graphs.stubborn import prejudices, stubbornness
 from ptcc_certify.report.text_layout import (
     TEXT,
     agent_text,
@@ -50,6 +52,7 @@ def graph_facts(structure: Structure, name: str, details: bool = True) -> Facts:
         brief=(brief,),
     )
     yield from _reading_facts(structure)
+    yield from _stubborn_facts(structure.graph)
     if not details:
         return
     yield Fact(head="nodes", note=shorten_list([labelled(label) for label in structure.graph.labels]), detail=True)
@@ -69,6 +72,7 @@ def family_facts(family: Family, name: str, read: str, components: Sequence[Fami
             read = read.replace(ORIENTATION[way], text)
     if read or family.notes:
         yield Fact(head="read", note="; ".join(filter(None, (read, *family.notes))))
+    yield from _stubborn_facts(family)
     if components is None:
         return
     yield Fact(head="nodes", note=shorten_list([labelled(label) for label in family.labels]), detail=True)
@@ -112,7 +116,7 @@ def family_text(family: Family, name: str) -> str:
     edges = sum(mode.n_edges for mode in family.modes)
     uncertain = sum(int((~mode.known).sum()) for mode in family.modes)
     optional = sum(int(mode.optional.sum()) for mode in family.modes)
-    rest = f"{counted(family.n_nodes, 'node')}, {counted(edges, 'edge')}"
+    rest = f"{_nodes_text(family)}, {counted(edges, 'edge')}"
     rest += f", {uncertain:,} uncertain" if uncertain > optional else ""
     if optional:
         rest += f", {optional:,}{' of them' if uncertain > optional else ''} optional"
@@ -136,8 +140,31 @@ def _uncertain_edges(mode: Mode) -> str:
 
 def _size(structure: Structure) -> str:
     graph, negative = structure.graph, int((structure.graph.sign < 0).sum())
-    size = f"{counted(graph.n_nodes, 'node')}, {counted(graph.n_edges, 'edge')} ({negative:,} negative)"
+    size = f"{_nodes_text(graph)}, {counted(graph.n_edges, 'edge')} ({negative:,} negative)"
     return f": {size}, {_connectivity(structure)}"
+
+
+def _nodes_text(given: SignedDigraph | Family) -> str:
+    """Tell how many nodes there are; agents and prejudices apart where some are stubborn."""
+    if not (added := len(prejudices(given))):
+        return counted(given.n_nodes, "node")
+    return f"{counted(given.n_nodes - added, 'agent')} and {counted(added, 'prejudice')}"
+
+
+def _stubborn_facts(given: SignedDigraph | Family) -> Facts:
+    """Tell which agents are stubborn, and how much."""
+    if not (weights := stubbornness(given)):
+        return
+    names, what = [labelled(agent_text(label)) for label in weights], "; weights of prejudices, added nodes"
+    sizes = [
+        f"{short_number(low)}{f' to {short_number(high)}' if low < high else ''}" for low, high in weights.values()
+    ]
+    if len(names) > 1 and len({*sizes}) == 1:
+        what = f" {sizes[0]} each{what}"
+    else:
+        names = [f"{name} {size}" for name, size in zip(names, sizes, strict=True)]
+    brief = shorten_list(names, TEXT - len(what)) + what
+    yield Fact(head="stubborn", value=list(weights), note=shorten_list(names, _LONG_LIST) + what, brief=(brief,))
 
 
 def _graph_text(structure: Structure, name: str) -> str:

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 
 from lmi.exact.decimal_rounding import counted, up
 from ptcc_certify.bounds.final_state.of_graph import extremes
+from ptcc_certify.bounds.final_state.opinions import disagreement, polarisation
 from ptcc_certify.certificate.constrained_switching.final_states import constant_states, last_states, states_of_signal
 from ptcc_certify.certificate.fact import Fact, Facts
 from ptcc_certify.errors import labelled
+from ptcc_certify.graphs.stubborn import prejudices
 from ptcc_certify.report.facts.claim import assumptions, range_text, told_ranges
 from ptcc_certify.report.facts.constrained_switching import agreement_text, every_text, rests
 from ptcc_certify.report.text_layout import (
@@ -88,6 +90,19 @@ def final_facts(certificate: Certificate) -> Facts:
     )
     if result.degenerate:
         yield Fact(head="x(T)", note=f"of this x(0) {_meeting(certificate)}", detail=True)
+    yield from _opinion_facts(certificate, result)
+
+
+def _opinion_facts(certificate: Certificate, result: FinalState) -> Facts:
+    """Tell of stubborn agents how far they lie apart before and after, where x(T) is exact and assumes nothing."""
+    graph, begin = certificate.graph_proof.graph, certificate.proof.initial_positions
+    if begin is None or not (result.exact and prejudices(graph)) or certificate.proof.offsets is not None:
+        return
+    if certificate.verdict == "undecided" or [*assumptions(certificate, states=True)]:
+        return
+    values = {f.__name__: [f(graph, begin), f(graph, result.states)] for f in (polarisation, disagreement)}
+    text = ", ".join(f"{name} {short_number(x)} -> {short_number(y)}" for name, (x, y) in values.items())
+    yield Fact(head="opinions", value=values, standing="unproved", note=f"from x(T): {text}")
 
 
 def _meeting(certificate: Certificate) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from ptcc_certify.graphs.stubborn import PREJUDICE
 from ptcc_certify.report.plots.camp_lines import HALO, NAME_SIZE, text_width
 from ptcc_certify.report.plots.graph_layout import Arrow, arc
 from ptcc_certify.report.plots.style import EDGE_STYLES
@@ -41,14 +42,17 @@ def draw_labels(
     taken = nodes + lines
     for label, p in zip(labels, place, strict=True):
         text = shorten_text(printable(label), BESIDE)
-        half = np.array([text_width(text) / 2, 0.6 * NAME_SIZE])
+        rows = [text]
+        if label.endswith(PREJUDICE):  # in two rows, for it is long
+            rows = [shorten_text(printable(label.removesuffix(PREJUDICE)), BESIDE - 2) + "'s", "prejudice"]
+        half = np.array([max(map(text_width, rows)) / 2, 0.6 * NAME_SIZE * len(rows)])
         turns = np.arctan2(p[1], p[0]) + np.pi / 4 * np.array([0, 1, -1, 2, -2, 3, -3, 4])  # away from the middle first
         ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
         spots = [p + way * (far * radius + 1) + half * way for far in (1, 2, 3, 4, 5, 6, 7) for way in ways]
         taken.append(box := least_covered(spots, half, taken))
         if (np.maximum(box[:2] - p, p - box[2:]) > 1.6 * radius).any():  # not beside its node
             ax.plot(*np.stack([p, np.clip(p, box[:2], box[2:])], axis=1), color="0.6", linewidth=0.5, zorder=1)
-        ax.annotate(text, p, (box[:2] + box[2:]) / 2, va="center", color="black", path_effects=HALO, **style)
+        ax.annotate("\n".join(rows), p, (box[:2] + box[2:]) / 2, va="center", color="black", path_effects=HALO, **style)
     return nodes + taken[len(nodes) + len(lines) :]
 
 
