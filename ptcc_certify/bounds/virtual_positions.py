@@ -81,7 +81,7 @@ class VehicleBounds:
     @property
     def by_steps(self) -> bool:
         """Whether they can be followed from instant to instant: double integrators under a cap of the gain."""
-        return self.input is not None and self.vehicles.team is None
+        return self.input is not None and self.vehicles.team is None and not self.vehicles.disturbance
 
     def over_time(self, case: LateCase, decays: Sequence[Carried], t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return what bounds deviations and velocities of all agents at instants, ``(N, M)`` floats.
@@ -100,10 +100,11 @@ class VehicleBounds:
                     continue
                 least = np.where(decaying + floor > 0, _LEAST, 0.0)[of]
                 both = []
+                shaken = 0.0 if order == 1 else float(self.vehicles.disturbance * tracking.steady)
                 for passed in (tracking.position, tracking.ahead):
-                    falling, standing, by_speed, by_push = map(float, passed)
+                    falling, standing, by_speed, by_push, _ = map(float, passed)
                     own = (by_speed * speed + by_push * push)[:, None] * y + falling * decaying + standing * floor
-                    both.append(own[of])
+                    both.append(own[of] + shaken)
                 position[of] = np.minimum(position[of], both[0] * _MORE + least)
                 if order > 1:
                     velocity[of] = np.minimum(velocity[of], a1 * g * (both[0] + both[1]) * _MORE + least)
@@ -137,7 +138,7 @@ class VehicleBounds:
         found = []
         for row in rows:
             decay = _of_row(case, replace(row, floor=row.floor + (row.after or 0), drift=None))
-            bound = _passed(messages, decay, self.vehicles, self.gains)[0]
+            bound = _passed(messages, decay, self.vehicles, self.gains, lasting=True)[0]
             found.append((bound + early).max())
             if not third:
                 found.append(np.maximum(bound + lasting, at_T).max())
@@ -236,8 +237,13 @@ def _tracking(messages: Messages, order: int, gains: tuple[Fraction, ...], b: Fr
     return Tracking(order, gains, b, messages.gain.k, messages.least_gain())
 
 
-def _passed(messages: Messages, decay: _Ends, vehicles: Vehicles, gains: tuple[Fraction, ...]) -> list[np.ndarray]:
-    """Return the bounds of all agents by one decay, in floats from above; infinite where it is too fast."""
+def _passed(
+    messages: Messages, decay: _Ends, vehicles: Vehicles, gains: tuple[Fraction, ...], lasting: bool = False
+) -> list[np.ndarray]:
+    """Return the bounds of all agents by one decay, in floats from above; infinite where it is too fast.
+
+    Of positions at ``T``, or ``lasting`` at all times, of what disturbs.
+    """
     pairs = [(decay.at_T, decay.floor), *[(decay.falling, decay.standing)] * 2]
     (speed, push), orders = vehicles.begun, np.array(vehicles.orders)
     found = [np.full(orders.size, np.inf) for _ in pairs[: 1 if messages.gain_cap is None else 3]]
@@ -246,9 +252,12 @@ def _passed(messages: Messages, decay: _Ends, vehicles: Vehicles, gains: tuple[F
         if not tracking.follows:
             continue
         each = passed_on(messages, decay.left, decay.cap, tracking)
+        if lasting and order > 1:
+            each = (each[0]._replace(disturbed=tracking.steady), *each[1:])
+        shaken = float_up(vehicles.disturbance)
         for bounds, passed, (falls, stands) in zip(found, each, pairs, strict=False):
-            falling, standing, by_speed, by_push = map(float_up, passed)
-            bound = by_speed * speed + by_push * push + falling * falls + standing * stands
+            falling, standing, by_speed, by_push, disturbed = map(float_up, passed)
+            bound = by_speed * speed + by_push * push + falling * falls + standing * stands + disturbed * shaken
             bounds[of] = (bound * _MORE + np.where(bound > 0, _LEAST, 0))[of]
     return found
 
@@ -302,7 +311,7 @@ def vehicles_section(bounds: VehicleBounds | None) -> VehiclesSection | None:
         numbers["orders"] = Numbers(list(map(Fraction, of.team)))
     if third:
         numbers |= {"a3": third[0], "a0": Numbers(of.a0)}
-    return VehiclesSection(a1=a1, a2=a2, v0=Numbers(of.v0), **numbers)
+    return VehiclesSection(a1=a1, a2=a2, v0=Numbers(of.v0), disturbance=of.disturbance or None, **numbers)
 
 
 def read_vehicles(section: VehiclesSection | None) -> VehicleBounds | None:
@@ -314,5 +323,6 @@ def read_vehicles(section: VehiclesSection | None) -> VehicleBounds | None:
     v0 = tuple(section.v0)
     orders = (2,) * len(v0) if section.orders is None else tuple(map(int, section.orders))
     gains = section.a1, section.a2, *([] if section.a3 is None else [section.a3])
-    vehicles = Vehicles(v0, orders, None if section.a0 is None else tuple(section.a0))
+    a0 = None if section.a0 is None else tuple(section.a0)
+    vehicles = Vehicles(v0, orders, a0, section.disturbance or Fraction(0))
     return VehicleBounds(vehicles, gains, position, velocity, push)

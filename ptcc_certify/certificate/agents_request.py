@@ -23,8 +23,13 @@ from ptcc_certify.model.case import Case
 from ptcc_certify.model.gain import Gain
 from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.model.late_messages import LateMessages
-from ptcc_certify.model.parameters import readable
-from ptcc_certify.model.refusals import asked_of_single_integrators, refuse_agents, refuse_beside_virtual_positions
+from ptcc_certify.model.parameters import parameter, readable
+from ptcc_certify.model.refusals import (
+    NOT_LATE,
+    asked_of_single_integrators,
+    refuse_agents,
+    refuse_beside_virtual_positions,
+)
 from ptcc_certify.model.virtual_positions import Vehicles, one_cap
 
 
@@ -90,6 +95,7 @@ def with_vehicles(case: Case) -> Case:
     agents = case.agents
     if not (isinstance(agents, Agents) and agents.virtual):
         return case
+    case, disturbance = _undisturbed(case)
     refuse_beside_virtual_positions(case)
     if case.uncertainty or is_family(case.graph):
         given: Any = as_family(case.graph, uncertainty=case.uncertainty)
@@ -103,7 +109,10 @@ def with_vehicles(case: Case) -> Case:
         raise ParameterError("dimension", "what is proved of vehicles on a line holds in each coordinate: give one")
     in_formation = any(h for (h,) in chains.offsets)
     cap = one_cap([agents.cap, *(limit.gain_cap for limit in case.limits), getattr(case.messages, "gain_cap", None)])
-    vehicles = _vehicles(chains.states, orders, graph)
+    if disturbance and 1 in orders:
+        label = shorten(graph.labels[orders.index(1)])
+        raise ParameterError("delta", f"is not proved yet of agents of order 1, as {label}, in a team; leave it out")
+    vehicles = replace(_vehicles(chains.states, orders, graph), disturbance=disturbance)
     if case.messages is None:
         messages = LateMessages(gain_cap=cap, vehicles=vehicles)
     else:
@@ -111,6 +120,20 @@ def with_vehicles(case: Case) -> Case:
     begin = InitialState([x for ((x, *_),) in chains.states or ()] or None)
     agents = Agents(1, offsets=chains.offsets) if in_formation else None
     return replace(case, graph=given, initial=begin, uncertainty=0, agents=agents, messages=messages, limits=())
+
+
+def _undisturbed(case: Case) -> tuple[Case, Fraction]:
+    """Return a case without what disturbs its vehicles, and that: virtual positions are not disturbed."""
+    leaders, delta = case.leaders, case.asks.delta
+    if case.sliding:
+        return case, Fraction(0)
+    disturbance = Fraction(0) if delta is None else parameter("delta", delta, True)
+    if leaders is not None and leaders.disturbance:
+        if delta is not None:
+            raise ParameterError("delta", NOT_LATE["delta"])
+        disturbance, leaders = leaders.disturbance, replace(leaders, disturbance=0)
+        leaders = None if leaders.idle else leaders
+    return replace(case, leaders=leaders, asks=replace(case.asks, delta=None)), disturbance
 
 
 def _orders(agents: Agents, graph: SignedDigraph) -> tuple[int, ...]:

@@ -20,7 +20,7 @@ from lmi.exact.numbers import integers, longest, shorten
 from lmi.exact.work import spend
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.follower_rows import Followers, Rows
-from ptcc_certify.checker.input_formulas import gain_above
+from ptcc_certify.checker.input_formulas import decay_above, gain_above
 from ptcc_certify.checker.message_ages import Messages
 from ptcc_certify.checker.reading import RejectedError, length, need
 from ptcc_certify.checker.section_declarations import Agents, Positive
@@ -285,15 +285,20 @@ class VehiclesSection:
     a3: Positive | None = None
     a0: Agents | None = None
     orders: Agents | None = None
+    disturbance: Positive | None = None
 
 
 class Passed(NamedTuple):
-    """By what a bound of vehicles grows with what falls and what stands of virtual states, |v_k(0)| and |x_k''(0)|."""
+    """By what a bound of vehicles grows with what falls and what stands of virtual states, |v_k(0)| and |x_k''(0)|.
+
+    And with ``|d_k|``, by what disturbs a vehicle of order 2 or 3: ``x_k^(n) = u_k + d_k``.
+    """
 
     falling: Fraction
     standing: Fraction
     begun: Fraction = Fraction(0)
     pushed: Fraction = Fraction(0)
+    disturbed: Fraction = Fraction(0)
 
 
 @dataclass(frozen=True)
@@ -364,30 +369,47 @@ class Tracking:
     @property
     def position(self) -> Passed:
         """What bounds ``|x_k - x*_k|`` by ``Y_k``."""
-        falling, standing, begun, pushed = self.ahead
+        falling, standing, begun, pushed, _ = self.ahead
         grown = Fraction(1) if self.order == 1 else self.gains[0] * self.lag
         return Passed(grown * falling, standing, grown * begun, grown * pushed)
 
+    @property
+    def shaken(self) -> Fraction:
+        """By what ``|y_n|``, as long as it decays no faster than ``e^(-b s)``, enters ``|x_k - x*_k|``."""
+        return self.lag if self.order == 2 else self.lag / self.slack
+
+    @property
+    def steady(self) -> Fraction:
+        """What ``|d_k| <= 1`` adds to ``|x_k - x*_k|`` and to ``|q_2 - x*_k|`` at all times."""
+        a1, a2 = self.gains[:2]
+        return self.unrest / (a1 if self.order == 2 else a1 * a2)
+
+    @property
+    def unrest(self) -> Fraction:
+        """What bounds ``|y_n|`` at all times by ``|d_k|``: ``y_n' = -(a_n + (n - 1) theta) g y_n + d_k/g^(n-1)``."""
+        return 1 / (self.gains[self.order - 1] * self.first**self.order)
+
     def offsets(self) -> tuple[Passed, ...]:
-        """Return what bounds ``|y_1|`` to ``|y_n|`` by ``|e_k| <= p_k y + n_k``."""
+        """Return what bounds ``|y_1|`` to ``|y_n|`` by ``|e_k| <= p_k y + n_k``; what disturbs stands."""
         zero, first, k = Fraction(0), self.first, self.k
         if self.order == 1:
             return ()
         a1, a2 = self.gains[:2]
         if self.order == 2:
-            last = [Passed(zero, zero, 1 / first)]
+            last = [Passed(zero, zero, 1 / first, zero, self.unrest)]
             second = last[0]
         else:
-            third = Passed(zero, zero, (a1 + a2) / first, 1 / first**2)
+            third = Passed(zero, zero, (a1 + a2) / first, 1 / first**2, self.unrest)
             second = Passed(
                 (a1 + a1 * self.lag / k) / self.slack,
                 (a1 + 1 / k) / a2,
                 third.begun / self.slack + 1 / first,
                 third.pushed / self.slack,
+                third.disturbed / a2,
             )
             last = [second, third]
-        p, n, v, x = second
-        return Passed(self.lag * (p + 1), (n + 1) / a1, self.lag * v, self.lag * x), *last
+        p, n, v, x, d = second
+        return Passed(self.lag * (p + 1), (n + 1) / a1, self.lag * v, self.lag * x, d / a1), *last
 
     def velocity_and_input(self) -> tuple[Passed, Passed]:
         """Return what bounds ``|x_k'|/g`` and ``|u_k|/g^n`` by ``|e_k| <= p_k y + n_k``.
@@ -411,7 +433,7 @@ class Tracking:
 
 def _sum(*terms: tuple[Fraction, Passed]) -> Passed:
     """Return a sum of bounds, each times its weight."""
-    return Passed(*(sum((w * part[i] for w, part in terms), Fraction(0)) for i in range(4)))
+    return Passed(*(sum((w * part[i] for w, part in terms), Fraction(0)) for i in range(5)))
 
 
 def passed_on(messages: Messages, left: Fraction, cap: Fraction | None, tracking: Tracking) -> tuple[Passed, ...]:
@@ -433,15 +455,33 @@ def passed_on(messages: Messages, left: Fraction, cap: Fraction | None, tracking
     4.0 2.0 3.0
     24.0 16.0 16.0
     """
-    falling, standing, begun, pushed = tracking.position
-    position, G = Passed(falling, standing, begun * left, pushed * left), messages.gain_cap
+    falling, standing, begun, pushed, _ = tracking.position
+    shaken = Fraction(0) if tracking.order == 1 else tracking.shaken * unrest_at_deadline(messages, tracking)
+    position, G = Passed(falling, standing, begun * left, pushed * left, shaken), messages.gain_cap
     if G is None:
         return (position,)
     found = [position]
     for power, one in zip((1, tracking.order), tracking.velocity_and_input(), strict=True):
         y = gain_above(messages.gain, G, tracking.b / power, cap) ** power
-        found.append(Passed(one.falling * y, one.standing * G**power, one.begun * y, one.pushed * y))
+        stands = G**power
+        found.append(
+            Passed(one.falling * y, one.standing * stands, one.begun * y, one.pushed * y, one.disturbed * stands)
+        )
     return tuple(found)
+
+
+def unrest_at_deadline(messages: Messages, tracking: Tracking) -> Fraction:
+    """Bound ``int_0^T e^(-b (s(T) - s(t))) g(t)^(1 - n) dt``, what ``|d_k| <= 1`` makes of ``|y_n|`` at ``T``.
+
+    It is 0 where the clock goes on for ever. Under a cap G, that acts from ``t_1`` on, it is at most ``1/(b G^n)`` of
+    what comes then, and of what comes before ``t_1 e^(-b G (T - t_1)) g(0)^(1 - n)``.
+    """
+    gain, G, n = messages.gain, messages.gain_cap, tracking.order
+    if G is None:
+        return Fraction(0)
+    since = Fraction(0) if messages.least_gain() == G else gain.T - gain.k / (G - gain.rho1)
+    before = decay_above(tracking.b * G * (gain.T - since)) * since / tracking.first ** (n - 1)
+    return 1 / (tracking.b * G**n) + before
 
 
 class Vehicles:
@@ -479,6 +519,8 @@ class Vehicles:
         need(not any(x for x, n in zip(self.pushed, self.orders, strict=True) if n < 3), "a0 of an order below 3")
         self.gains = section.a1, section.a2, *([] if section.a3 is None else [section.a3])
         self.steps: VehicleSteps | None = None
+        self.disturbance = section.disturbance or Fraction(0)
+        need(not self.disturbance or 1 not in self.orders, "agents of order 1 that are disturbed")
 
     def by_rows(self, rows: Rows, decay: Decay) -> None:
         """Mark what is at least as large as this decay makes it, unless it is too fast for the gains."""
@@ -542,11 +584,12 @@ class Vehicles:
             passed_all = passed_on(self.messages, left, cap, tracking)
             for one, passed, terms in zip(self.stated, passed_all, (position, moving, moving), strict=False):
                 own = [(factor, [column[i] for i in chosen]) for factor, column in terms(passed)]
-                one.meet(of, (passed.begun / self.scale, begun), (passed.pushed / self.unit, pushed), *own)
+                shaken = passed.disturbed * self.disturbance, [1] * len(of)
+                one.meet(of, (passed.begun / self.scale, begun), (passed.pushed / self.unit, pushed), shaken, *own)
 
     def along(self, walk: Walk) -> VehicleSteps | None:
-        """Return what follows vehicles from instant to instant; None without a cap of the gain, or of other orders."""
-        if self.messages.gain_cap is not None and set(self.orders) == {2}:
+        """Return what follows vehicles from instant to instant; None without a cap, of other orders, or disturbed."""
+        if self.messages.gain_cap is not None and set(self.orders) == {2} and not self.disturbance:
             begun = [Fraction(abs(self.begun[v]), self.scale) for v in walk.steps.nodes]
             self.steps = VehicleSteps(walk, begun, self.section.a1, self.section.a2)
         return self.steps

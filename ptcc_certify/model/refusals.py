@@ -34,10 +34,10 @@ _NOT_OF_AGENTS = {
 }
 _NO_SET = "is not taken up here, bounds are from one initial state, x0; leave it out"
 #: What is not proved of agents that exchange virtual positions, of all that may be asked.
-_NOT_OF_VEHICLES = ("stop_before", "sample_period", "noise", "delta", "disturbance", "initial_set", "sigma0")
+_NOT_OF_VEHICLES = ("stop_before", "sample_period", "noise", "disturbance", "initial_set", "sigma0")
 _WORDS_OF_VEHICLES = {"protocol": "the sliding-mode protocol "}
 #: What is not certified beside late messages, and what to do instead.
-_NOT_LATE = {
+NOT_LATE = {
     "initial_set": _NO_SET,
     "stop_before": "late messages are certified under a gain cap alone; leave it out",
     "sample_period": "of late messages a period tells how often they are sent; give that instead",
@@ -48,7 +48,7 @@ _CAPPED = "beside what moves, disturbs or clips followers one gain cap alone is 
 _NOT_TRACKING = {
     "initial_set": _NO_SET,
     **dict.fromkeys(("gain_cap", "stop_before", "sample_period"), _CAPPED),
-    "delta": _NOT_LATE["delta"],
+    "delta": NOT_LATE["delta"],
 }
 
 
@@ -125,7 +125,7 @@ def refuse_of_families(case: Case) -> None:
             raise ParameterError("biases", "of a family make other places in every graph; give offsets instead")
         refuse_in_places(case.leaders)
     if given:
-        mend = {"limits": "families take one gain cap alone; leave others out", "delta": _NOT_LATE["delta"]}
+        mend = {"limits": "families take one gain cap alone; leave others out", "delta": NOT_LATE["delta"]}
         text = "is not for families of graphs yet, nor for what one graph has proved as one; leave it out"
         raise ParameterError(given[0], mend.get(given[0], text))
     _refuse_beside_any_graph(case)
@@ -174,7 +174,6 @@ it out
     leaders, messages = case.leaders, case.messages
     asked = {"protocol": case.sliding} | {name: case.given(name) is not None for name in _NOT_OF_VEHICLES}
     asked |= {
-        "delta": asked["delta"] or (leaders is not None and leaders.disturbance > 0),
         "sign_gain": leaders is not None and leaders.sign_gain is not None,
         "growth": leaders is not None and leaders.growth is not None,
         "saturation": leaders is not None and leaders.saturation is not None,
@@ -221,7 +220,7 @@ def refuse_beside(structure: Structure, case: Case) -> None:
     if messages is None and leaders is None:
         return
     late = messages is not None and not messages.tracks
-    _refuse_more(_NOT_LATE if late else _NOT_TRACKING, case)
+    _refuse_more(NOT_LATE if late else _NOT_TRACKING, case)
     if leaders is not None:
         if messages is None or messages.leaders is None:
             raise ParameterError("leaders", "that move are not certified of these agents; leave them out")

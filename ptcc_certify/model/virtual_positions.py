@@ -41,11 +41,14 @@ class Vehicles:
         1 to 3: 2 are double integrators.
     a0 : tuple of N Fraction or None
         Their initial accelerations, where any is of order 3; 0 of others.
+    disturbance : Fraction
+        ``|d_k|`` at most, of order 2 and 3: ``x_k^(n) = u_k + d_k``, d measurable.
     """
 
     v0: tuple[Fraction, ...]
     orders: tuple[int, ...]
     a0: tuple[Fraction, ...] | None = None
+    disturbance: Fraction = Fraction(0)
 
     @property
     def team(self) -> tuple[int, ...] | None:

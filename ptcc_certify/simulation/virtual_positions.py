@@ -47,9 +47,10 @@ class _Tracking(AgentsMotion):
 
     moved = 1
 
-    def __init__(self, graph: SignedDigraph, state: np.ndarray, of: TrackingProtocol, rtol: float):
+    def __init__(self, graph: SignedDigraph, state: np.ndarray, of: TrackingProtocol, rtol: float, push: float = 0.0):
         super().__init__(graph, state, rtol)
         self._gains, self._orders = [float(a) for a in of.gains], np.array(of.orders or (2,) * graph.n_nodes)
+        self._push = push
 
     def slope(self, x: ca.MX, phase: Phase, z: ca.MX) -> ca.MX:
         """Return the slope of positions, scaled velocities and virtual positions on the clock of the phase."""
@@ -62,6 +63,8 @@ class _Tracking(AgentsMotion):
         for n in np.unique(self._orders).tolist():
             of = ca.DM((self._orders == n).astype(float))
             pushed = tracking_input(self._gains, own[:n], virtual, e, 1.0, theta)
+            if self._push and n > 1:
+                pushed = pushed + self._push * (R / h) ** n
             for i, rising in enumerate([*own[1:n], pushed]):
                 slopes[i] += of * (rising - i * theta * own[i])
         return h * ca.horzcat(*slopes, e)
@@ -122,7 +125,8 @@ def simulate_vehicles(
     g = _gain_kept(limited, instants.t, instants.remaining)
     begun = [np.array([float(x) for x in values]) for values in (vehicles.v0, vehicles.a0 or ())]
     first = [np.asarray(x0, dtype=float), *(begun[i - 1] / g[0] ** i for i in range(1, n)), np.asarray(x0, dtype=float)]
-    states, _ = sample(_Tracking(graph, np.array(first).T, protocol, rtol), limited, instants)
+    motion_of = _Tracking(graph, np.array(first).T, protocol, rtol, float(vehicles.disturbance))
+    states, _ = sample(motion_of, limited, instants)
     *own, z = states.transpose(2, 1, 0)
     motion = [w * g**i for i, w in enumerate(own)]
     moved, slope = -g * (graph.laplacian() @ z), _slope(protocol, g)
@@ -205,9 +209,9 @@ def _followed(run: Trajectory, protocol: TrackingProtocol, vehicles: Vehicles) -
         for n in set(vehicles.orders) - {1}:
             of, (a1, a2) = orders == n, gains[:2]
             v0, a0 = (values[of] for values in begun)
-            left = np.exp(-gains[n - 1] * s)
             last = v0 if n == 2 else a0 + (a1 + a2) * g[0] * v0
-            ahead = np.where(np.isfinite(g), last * left / g ** (n - 1), 0.0)  # y_n
+            r = last * np.exp(-gains[n - 1] * s) + float(vehicles.disturbance) * _steady_push(run.t, gains[n - 1] * s)
+            ahead = np.where(np.isfinite(g), r / g ** (n - 1), 0.0)  # y_n
             A, start = np.full((s.size, n - 1, n - 1), -a1), np.zeros((n - 1, len(v0)))
             if n == 3:
                 theta = np.nan_to_num(slope / g**2, nan=0.0)
@@ -231,6 +235,15 @@ def _followed(run: Trajectory, protocol: TrackingProtocol, vehicles: Vehicles) -
             part[leading] = value[leading]
         u[leading] = 0.0
     return [*told, u]
+
+
+def _steady_push(t: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """Return ``int_0^t e^(s(r) - s(t)) dr`` at instants, (M,): what a steady push of 1 makes of ``r_n``."""
+    pushed = np.zeros(t.size)
+    for i, (time, way) in enumerate(zip(np.diff(t), np.diff(s), strict=True)):
+        mean = -math.expm1(-way) / way if 0 < way < math.inf else float(way == 0)
+        pushed[i + 1] = pushed[i] * math.exp(-way) + time * mean
+    return pushed
 
 
 def _filtered(z: np.ndarray, ahead: np.ndarray, s: np.ndarray, start: np.ndarray, A: np.ndarray) -> np.ndarray:

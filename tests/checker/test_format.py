@@ -166,7 +166,7 @@ def test_the_schema_is_a_strict_schema():
         "LateFamilyForm": {"sizes", "floor", "push", "growth"},
         "Moving": {"sign_gain", "growth", "saturation"},
         "RowsBound": {"cap", "clock", "drift", "after", "start", "turn", "level"},
-        "VehiclesSection": {"velocity", "input", "a3", "a0", "orders"},
+        "VehiclesSection": {"velocity", "input", "a3", "a0", "orders", "disturbance"},
     }
 
 

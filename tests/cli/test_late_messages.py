@@ -800,9 +800,13 @@ def test_vehicles_that_exchange_virtual_positions_are_certified_checked_drawn_an
         rows = run.out.splitlines()
         assert len(rows) > 100 and [float(x) for x in rows[1].split(",")[2:10]] == [1, 3, 4, -4, *lead, 2, -1, 3]
     assert ptcc(*asked, *late, "-o", "vehicles.png").code == 0
-    for flag, *value in (("--stop-before", "0.1"), ("--sample-period", "0.1"), ("--noise", "1"), ("--delta", "1")):
+    for flag, *value in (("--stop-before", "0.1"), ("--sample-period", "0.1"), ("--noise", "1")):
         said = ptcc(*asked, *late, flag, *value)
         assert said.code == 2 and f"{flag} is not proved yet where virtual positions are exchanged" in said.err
+    for more in (late, late[:2]):
+        said = ptcc("certify", "team.csv", *QUICK, *START, *VEHICLES, *more, "--delta", "1", "-o", "c.json")
+        assert said.code == 0 and "any |d_k| <= 1 beside u_k; double integrators" in " ".join(said.out.split())
+        assert ptcc("check", "c.json").code == 0 and ptcc(*asked, *more, "--delta", "1").code == 0
     assert "have instants of their own" in ptcc(*asked, *late, "--samples", "20").err
     assert "--pattern says how late messages are" in ptcc(*asked, "--pattern", "square").err
     family = ptcc("certify", "team.csv", *QUICK[:4], *START, *VEHICLES, "--uncertainty", "5%", "--gain-cap", "20")

@@ -95,6 +95,8 @@ def _vehicles(certificate: Certificate, late: LateBounds) -> Facts:
     mixed = [f"{orders.count(n)} {names[n]}" for n in sorted(set(orders))]
     who = names[orders[0]] if len(mixed) == 1 else ", ".join(mixed)
     text = f"{who} integrators exchange virtual positions z_k, z_k' = gain e_k"
+    if late.messages.vehicles.disturbance:
+        text = f"any |d_k| <= {near(late.messages.vehicles.disturbance)} beside u_k; {text}"
     if (proved := late.vehicles) is None:
         yield Fact(head="agents", note=text)
         return
