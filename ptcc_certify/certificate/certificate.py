@@ -15,9 +15,9 @@ from lmi.exact.decimal_rounding import down
 from ptcc_certify.certificate.agents_table import agents_table
 from ptcc_certify.certificate.certificate_file import Recorded, RejectedCertificate, bytes_of, text_of
 from ptcc_certify.certificate.checking import read_and_check, refuse_no_certificate
+from ptcc_certify.certificate.document import read_document
 from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.proof import Source
-from ptcc_certify.certificate.read_document import read_document
 from ptcc_certify.certificate.section_io import read_side_files
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.errors import FormatError, gated
