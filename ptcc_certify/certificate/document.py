@@ -1,4 +1,4 @@
-"""The JSON of a certificate, schema ``ptcc-certificate/3``, written from sections."""
+"""The JSON of a certificate, schema ``ptcc-certificate/3``: written from sections, read back once it is accepted."""
 
 from __future__ import annotations
 

@@ -782,7 +782,7 @@ def test_late_messages_and_leaders_that_move_are_saved_and_read() -> None:
 
 
 def test_late_messages_and_leaders_of_which_nothing_is_proved_are_read_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("ptcc_certify.certificate.messages_part.bound_late", _nothing)
+    monkeypatch.setattr("ptcc_certify.certificate.certification.bound_late", _nothing)
     graph, leaders = SignedDigraph.from_edges([("a", "b", 1)]), MovingLeaders("1/2")
     protocol, messages = NominalProtocol(T=1, rho1=1, rho2=3, kappa=1), LateMessages("0.03")
     made = certify(
