@@ -7,8 +7,7 @@ from typing import Any
 
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.theorems.agreeing_groups import FamilyGroups
-from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
-from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
+from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, counterexample_text, mode_name
 
 
 def decision_document(family: Family, components: Sequence[FamilyComponent]) -> dict[str, Any]:

@@ -37,7 +37,7 @@ from ptcc_certify.lyapunov.slow_signals import Member, SignalRateBound, prove_ag
 from ptcc_certify.model.base import Protocol
 from ptcc_certify.model.constrained_switching import SignalClass
 from ptcc_certify.model.late_messages import LateMessages
-from ptcc_certify.theorems.counterexample_text import mode_name
+from ptcc_certify.theorems.family_behaviour import mode_name
 
 #: Of what it is read where it comes from.
 ORIGINS = ("graph", "read", "x(0)", "v(0)", "a(0)", "sigma(0)")

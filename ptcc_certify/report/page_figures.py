@@ -32,8 +32,7 @@ from ptcc_certify.report.plots.trajectory import plot_sliding, plot_trajectory
 from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.simulation.late_messages import can_run
 from ptcc_certify.simulation.trajectory import Trajectory
-from ptcc_certify.theorems.counterexample_text import counterexample_text
-from ptcc_certify.theorems.family_behaviour import DEPENDS, Counterexample, FamilyComponent
+from ptcc_certify.theorems.family_behaviour import DEPENDS, Counterexample, FamilyComponent, counterexample_text
 
 #: What draws each figure of a certificate, on given axes or its own; all but the graph show its simulated run.
 PLOTS: dict[str, Callable[..., Any]] = {

@@ -34,8 +34,7 @@ from ptcc_certify.report.page import THEOREM, protocol_latex
 from ptcc_certify.report.page_states_table import state_rows
 from ptcc_certify.report.plots.subject import ideal_text
 from ptcc_certify.report.text_layout import arithmetic
-from ptcc_certify.theorems.counterexample_text import mode_name
-from ptcc_certify.theorems.family_behaviour import DEPENDS
+from ptcc_certify.theorems.family_behaviour import DEPENDS, mode_name
 
 #: Agents up to which ``W`` is printed (a matrix of amsmath has 10 columns), and edges up to which these are.
 _MATRIX, _EDGES = 10, 60

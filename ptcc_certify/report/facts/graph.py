@@ -23,8 +23,7 @@ from ptcc_certify.report.text_layout import (
     shorten_list,
     shorten_text,
 )
-from ptcc_certify.theorems.counterexample_text import mode_name
-from ptcc_certify.theorems.family_behaviour import FamilyComponent
+from ptcc_certify.theorems.family_behaviour import FamilyComponent, mode_name
 
 ORIENTATION = {
     "information": "row a,b: information flows a -> b",

@@ -28,7 +28,7 @@ from ptcc_certify.report.plots.sizes import SINGLE_COLUMN, current_sizes
 from ptcc_certify.report.plots.style import BEHIND, EDGE_STYLES, axes_of, finished, styled
 from ptcc_certify.report.plots.subject import is_of_family, structure_of
 from ptcc_certify.report.text_layout import columns, printable, shorten_text
-from ptcc_certify.theorems.counterexample_text import mode_name
+from ptcc_certify.theorems.family_behaviour import mode_name
 
 #: Colour of the ground under a leader group, and how far it reaches beyond its nodes, in radii.
 GROUND, REACH = "#E2E2E2", 1.5
