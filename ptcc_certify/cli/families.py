@@ -299,8 +299,7 @@ def refuse_options(options: shared.Options, certified: bool = False) -> None:
 
 def _constant_alone(constant: Sequence[FamilyComponent], every: Sequence[FamilyComponent]) -> Sequence[FamilyComponent]:
     """Return what constant signals do where neither all signals nor single modes show it; nothing where they do."""
-    from ptcc_certify.theorems.family_behaviour import DEPENDS
-    from ptcc_certify.theorems.last_mode import last_mode_behaviours
+    from ptcc_certify.theorems.family_behaviour import DEPENDS, last_mode_behaviours
 
     follows = all(
         None not in last_mode_behaviours(other) if other.behaviour == DEPENDS else one.behaviour == other.behaviour

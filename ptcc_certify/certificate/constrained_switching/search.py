@@ -36,8 +36,7 @@ from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.model import Protocol
 from ptcc_certify.model.constrained_switching import ClockShares, DwellTime, JointWindows, SignalClass
 from ptcc_certify.theorems.contractions import joint_behaviour, window_rate
-from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
-from ptcc_certify.theorems.last_mode import last_mode_behaviours
+from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, last_mode_behaviours
 
 STEP = "restricted signals"
 #: 1 - t/T at which switches are weighed against the rate.
