@@ -279,7 +279,7 @@ def mean_constant(function: CommonForm, q: Mapping[int, Fraction]) -> Fraction |
     Examples
     --------
     >>> from ptcc_certify.graphs.family import Family
-    >>> from ptcc_certify.lyapunov.common_left_vector import undirected_function
+    >>> from ptcc_certify.lyapunov.common_form_search import undirected_function
     >>> pair = Quotient(Family.from_intervals([("a", "b", 1, 3)], undirected=True))
     >>> mean_constant(undirected_function(pair), {0: Fraction(1), 1: Fraction(1)})
     Fraction(0, 1)
