@@ -84,7 +84,7 @@ _EXPORTS = {
     "Certificate": "certificate.certificate",
     "Asks": "model.asks",
     "Expectations": "model.asks",
-    "InitialState": "model.initial_state",
+    "InitialState": "model.asks",
     "read_certificate": "certificate.certificate",
     "check": "certificate.checking",
     # Bounds and design

@@ -64,8 +64,7 @@ from ptcc_certify.certificate.certification import certify
 from ptcc_certify.errors import PTCCError, explain, one_line
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import random_states, read_graph, read_state
-from ptcc_certify.model.asks import Asks, Expectations
-from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.asks import Asks, Expectations, InitialState
 
 #: A row: column by column, None where an entry is empty.
 Row = dict[str, Any]

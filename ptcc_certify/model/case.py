@@ -11,11 +11,10 @@ from ptcc_certify.checker.input_formulas import Limits
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.model.agents import Agents
-from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.asks import Asks, InitialState
 from ptcc_certify.model.base import Protocol
 from ptcc_certify.model.constrained_switching import SignalClass
 from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.model.late_messages import LateMessages, told_leaders
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.parameters import parameter

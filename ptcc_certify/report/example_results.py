@@ -12,8 +12,7 @@ from lmi.exact.decimal_rounding import down, float_down, near, up
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.examples import Example, load_graph
-from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.asks import Asks, InitialState
 
 #: The head of the table that ``ptcc examples`` prints; its rows are of :func:`result_lines`.
 RESULTS_HEAD = (

@@ -22,8 +22,7 @@ from ptcc_certify.gain_design.deadline_search import TOLERANCE, Candidate, at_de
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.agents import Agents
-from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.asks import Asks, InitialState
 
 TRIO = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 2), ("a", "c", -1), ("c", "a", -1)])
 PLACES = {"a": [0, 0], "b": [1, 0], "c": [0, 1]}

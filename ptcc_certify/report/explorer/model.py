@@ -26,10 +26,9 @@ from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io.packaged import GRAPHS
 from ptcc_certify.graphs.size_limits import EXPLORED_NODES
-from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.asks import Asks, InitialState
 from ptcc_certify.model.case import Case
 from ptcc_certify.model.disturbance import as_disturbance
-from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.model.reaching_time import certified_reaching_times
 from ptcc_certify.model.refusals import refuse_before_the_graph
 from ptcc_certify.report.explorer.facts import UNCHECKED, of_controls, rows_of
