@@ -16,7 +16,7 @@ from lmi.exact.decimal_rounding import counted
 from lmi.search_time import share_of_time
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.bounds.final_state.attracting_box import AttractingBox, box_of_family
-from ptcc_certify.bounds.final_state.kept_means import with_means
+from ptcc_certify.bounds.final_state.constant_weights import with_means
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.constrained_switching.claims import RateClaim
 from ptcc_certify.certificate.constrained_switching.search import STEP, claims_for, require_nominal

@@ -13,8 +13,7 @@ from fractions import Fraction
 from lmi.exact.elementary_enclosures import log, rounded
 from lmi.search_time import share_of_time
 from ptcc_certify.bounds.final_state.attracting_box import have_common_denominator
-from ptcc_certify.bounds.final_state.constant_weights import ValueEnds, value_ends
-from ptcc_certify.bounds.final_state.kept_means import mean_of_shares
+from ptcc_certify.bounds.final_state.constant_weights import ValueEnds, mean_of_shares, value_ends
 from ptcc_certify.certificate.constrained_switching.claims import (
     Claim,
     FinalValueClaim,
