@@ -141,7 +141,7 @@ def _show(
 ) -> int:
     """Print the answer, and the command that proves it again; return the exit code."""
     from ptcc_certify.gain_design.answer import INFEASIBLE, MET
-    from ptcc_certify.report.facts.of_structure import design_facts
+    from ptcc_certify.report.facts.graph import design_facts
 
     if as_json:
         print_json(answer.to_dict() | {"command": None if command is None else " ".join(command)})

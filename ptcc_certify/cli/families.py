@@ -203,7 +203,7 @@ def _show_decision(
     options: shared.Options,
 ) -> None:
     from ptcc_certify.certificate.classification_document import decision_document
-    from ptcc_certify.report.facts.of_structure import decision_facts
+    from ptcc_certify.report.facts.graph import decision_facts
 
     if as_json:
         print_json(decision_document(family, components))
