@@ -22,11 +22,11 @@ from selection import thinned
 from lmi.errors import NoCertificate
 from ptcc_certify.bounds.delay import decay_by_rows
 from ptcc_certify.bounds.delay.case import LateCase
+from ptcc_certify.bounds.delay.certain_misses import levels
 from ptcc_certify.bounds.delay.decay_by_rows import drift_integral
 from ptcc_certify.bounds.delay.late_messages import LateBounds, bound_late
 from ptcc_certify.bounds.delay.longest_delay import bound_at, bound_case, longest_delay
 from ptcc_certify.bounds.delay.small_delays import delay_threshold
-from ptcc_certify.bounds.delay.staged_deadlines import levels
 from ptcc_certify.bounds.final_state.of_graph import final_state
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.certification import certify
