@@ -8,7 +8,7 @@ part of the gain raised the bound wherever it was tried. So the deadline is soug
 There, and where agents meet at rest, ``rho2 kappa`` is raised if the input is not bounded by the one that is given.
 
 Deadlines that were not tried are excluded by nothing but what holds for all gains of the protocol:
-:mod:`ptcc_certify.bounds.agents.shortest_time`.
+:mod:`ptcc_certify.gain_design.deadline_search`.
 
 The search is bisection with secants in the logarithms of deadline and bound. Every candidate is proved, by
 :func:`~ptcc_certify.certificate.agents_part.prove_agents`, and compared with the limit exactly; it ends where a
@@ -19,15 +19,17 @@ deadline: agents may fly towards each other.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
+from math import comb, factorial, lcm
 from typing import TYPE_CHECKING, Any
 
 from lmi.errors import NoCertificate
 from lmi.exact.decimal_rounding import up
+from lmi.exact.polynomials import product, shifted
 from ptcc_certify.bounds.agents.each_agent import scaled_states
-from ptcc_certify.bounds.agents.shortest_time import shortest_time
 from ptcc_certify.bounds.final_state.enclosed_ends import agents_ends
 from ptcc_certify.bounds.input.tightest_bound import log
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
@@ -46,6 +48,74 @@ from ptcc_certify.model.parameters import parameter
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import Exact
+
+#: A shortest time is found to one part in ``2^20``.
+_BITS = 20
+
+
+def shortest_time(deviations: Sequence[Sequence[Fraction]], limit: Fraction) -> Fraction:
+    """Return a time below which no input within a limit ends a deviation from a free motion; 0 if there is none.
+
+    Parameters
+    ----------
+    deviations : d rows of n Fraction
+        Of position, velocity and so on, in each coordinate of space.
+    limit : Fraction
+        Positive: ``U`` of the Euclidean norm of the input, in units of the input.
+
+    Returns
+    -------
+    Fraction
+        In units of time.
+
+    Examples
+    --------
+    >>> float(shortest_time([[Fraction(1)]], Fraction(2)))
+    0.5
+    >>> float(shortest_time([[Fraction(1), Fraction(0)]], Fraction(1)))  # bang-bang: full speed up, full speed down
+    2.0
+    """
+    n = len(deviations[0])
+    bounds = [_largest_root(_excess(deviations, j, limit)) for j in range(n)]
+    return max((1 / z for z in bounds if z), default=Fraction(0))
+
+
+def _excess(deviations: Sequence[Sequence[Fraction]], j: int, limit: Fraction) -> list[int]:
+    """Return ``(z |..|)^2 - U^2`` as a polynomial in ``z = 1/T``, the highest power first, times a positive number."""
+    n = len(deviations[0])
+    factors = [4**q * factorial(q) * comb(j + q + 1, 2 * q + 1) for q in range(n)]
+    rows = [[c * row[n - 1 - q] for q, c in enumerate(factors)] for row in deviations]
+    scale = lcm(limit.denominator, *(x.denominator for row in rows for x in row))
+    total = [0] * (2 * n + 1)
+    for row in rows:
+        p = [int(x * scale) for x in reversed(row)] + [0]
+        total = [a + b for a, b in zip(total, product(p, p), strict=True)]
+    total[-1] -= int(limit * scale) ** 2
+    return total
+
+
+def _largest_root(p: list[int]) -> Fraction | None:
+    """Return a number above which a polynomial is not negative; None if it is nowhere seen to be.
+
+    Its Taylor coefficients there have one sign, so that it grows from there on.
+    """
+    if not any(p[:-1]):
+        return None
+
+    def grows(z: Fraction) -> bool:
+        return min(shifted(p, z)) >= 0
+
+    high = Fraction(1)
+    while not grows(high):
+        high *= 2
+    while grows(high / 2):
+        high /= 2
+    low = high / 2
+    while high - low > high / 2**_BITS:
+        middle = (low + high) / 2
+        low, high = (low, middle) if grows(middle) else (middle, high)
+    return high
+
 
 #: A deadline that is shorter by this share than the one that is found does not keep the limit.
 TOLERANCE = Fraction(1, 1000)
