@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_up
+from ptcc_certify.bounds.decay import ReachingPhase
 from ptcc_certify.bounds.deviation.component_bounds import ComponentBounds, FunctionOf, RestStates
 from ptcc_certify.bounds.deviation.heard import HeardRows
 from ptcc_certify.bounds.final_state.attracting_box import AttractingBox
 from ptcc_certify.bounds.final_state.constant_weights import LeadingGroup, leading_groups
 from ptcc_certify.bounds.final_state.labelled_ends import FinalEnds
 from ptcc_certify.bounds.instants import Instants, remaining_part
-from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.certificate.constrained_switching.claims import (
     Claim,
     FinalValueClaim,

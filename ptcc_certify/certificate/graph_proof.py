@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from ptcc_certify.bounds.agents.each_agent import error_constants
+from ptcc_certify.bounds.decay import ReachingPhase
 from ptcc_certify.bounds.delay.case import DecayingForm
 from ptcc_certify.bounds.delay.late_messages import late_obligations
 from ptcc_certify.bounds.deviation.from_final_state import DeviationGeometry
@@ -23,7 +24,6 @@ from ptcc_certify.bounds.final_state.of_graph import FinalState, Influence, infl
 from ptcc_certify.bounds.input.effort import Effort
 from ptcc_certify.bounds.input.effort_bounds import InputRequest, bound_effort, full_constants
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
-from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.proof import Proof
 from ptcc_certify.certificate.tube import Tube, tube_of
