@@ -34,10 +34,16 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float, writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
-from ptcc_certify.lyapunov.common_form_search import CLOSED_ROWS, FULL_ROWS, CommonFormSearch, search_common_forms
+from ptcc_certify.lyapunov.common_form_search import (
+    CLOSED_ROWS,
+    FULL_ROWS,
+    Aim,
+    CommonFormSearch,
+    aimed_functions,
+    search_common_forms,
+)
 from ptcc_certify.lyapunov.common_forms import CommonForm
 from ptcc_certify.lyapunov.follower_function import follower_functions
-from ptcc_certify.lyapunov.forms_for_one_state import Aim, aimed_functions
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.slow_signals import prove_signal_rate_bound
 from ptcc_certify.lyapunov.squares_function import SquaresFunction, squares_function
