@@ -101,8 +101,8 @@ _EXPORTS = {
     "certify_many": "batch",
     # Figures
     "plot_glance": "report.plots.glance",
-    "plot_motion": "report.plots.motion",
-    "plot_formation": "report.plots.motion",
+    "plot_motion": "report.plots.trajectory",
+    "plot_formation": "report.plots.trajectory",
     "plot_trajectory": "report.plots.trajectory",
     "plot_decay": "report.plots.decay",
     "plot_run": "report.plots.trajectory",

@@ -65,13 +65,12 @@ from ptcc_certify.report.plots.glance import plot_glance
 from ptcc_certify.report.plots.graph import GROUND, plot_graph, weight_ranges
 from ptcc_certify.report.plots.graph_layout import FREE_NODES, arc
 from ptcc_certify.report.plots.input import plot_effort, plot_input
-from ptcc_certify.report.plots.motion import plot_formation, plot_motion
 from ptcc_certify.report.plots.sizes import DOUBLE_COLUMN, SINGLE_COLUMN, figures_for
 from ptcc_certify.report.plots.spectrum import CLASS_MARKERS, plot_frontier, plot_spectrum
 from ptcc_certify.report.plots.style import BEHIND, BOUND, EDGE_STYLES, STYLE, save_figure
 from ptcc_certify.report.plots.tracking import plot_tracking
 from ptcc_certify.report.plots.trade_off import plot_trade_off
-from ptcc_certify.report.plots.trajectory import plot_run, plot_sliding, plot_trajectory
+from ptcc_certify.report.plots.trajectory import plot_formation, plot_motion, plot_run, plot_sliding, plot_trajectory
 from ptcc_certify.report.report_file import write_report
 from ptcc_certify.simulation.nominal import Bounded
 from ptcc_certify.simulation.run import simulate
