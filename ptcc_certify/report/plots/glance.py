@@ -31,8 +31,7 @@ from ptcc_certify.report.plots.camp_lines import (
 from ptcc_certify.report.plots.decay import NothingDecays
 from ptcc_certify.report.plots.distributions import plot_final_states
 from ptcc_certify.report.plots.final_colours import at_deadline, colours_at_end, final_states, positions_of
-from ptcc_certify.report.plots.graph import delays_of, node_id, plot_graph
-from ptcc_certify.report.plots.graph_labels import INSIDE
+from ptcc_certify.report.plots.graph import INSIDE, delays_of, node_id, plot_graph
 from ptcc_certify.report.plots.sizes import DOUBLE_COLUMN, SINGLE_COLUMN, current_sizes
 from ptcc_certify.report.plots.style import BEHIND, BOUND, STYLE, finished, legend_columns, new_axes, shown, time_label
 from ptcc_certify.report.plots.subject import read_back, trajectory_of
