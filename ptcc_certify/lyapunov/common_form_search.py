@@ -32,8 +32,7 @@ from ptcc_certify.lyapunov.common_forms import CommonForm, form_with_constants, 
 from ptcc_certify.lyapunov.error_system import rounded_matrix
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.search_failures import failures_told
-from ptcc_certify.theorems.lemmas import solve_exact
-from ptcc_certify.theorems.matrix_arithmetic import Matrix
+from ptcc_certify.theorems.lemmas import Matrix, solve_exact
 
 Vector = tuple[Fraction, ...]
 

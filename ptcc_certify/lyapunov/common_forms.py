@@ -21,7 +21,7 @@ from ptcc_certify.checker.common_forms import Scaled, spread
 from ptcc_certify.checker.common_kernel_ends import WeightedMean
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.lyapunov.quotient import Quotient, QuotientMode
-from ptcc_certify.theorems.matrix_arithmetic import Matrix, integer_matrix, integer_rows
+from ptcc_certify.theorems.lemmas import Matrix, integer_matrix, integer_rows
 
 #: Significant bits of constants, which are rounded up.
 _CONSTANT_BITS = 53

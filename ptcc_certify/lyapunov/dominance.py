@@ -36,8 +36,7 @@ from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import Dominance, GroupProof, LyapunovBlock, LyapunovFunction
 from ptcc_certify.theorems.leaders_and_followers import prove_connectivity
-from ptcc_certify.theorems.lemmas import dyadic_left_vector, gauge, left_vector
-from ptcc_certify.theorems.matrix_arithmetic import diagonal_matrix, symmetric_product
+from ptcc_certify.theorems.lemmas import diagonal_matrix, dyadic_left_vector, gauge, left_vector, symmetric_product
 
 #: Relative deviations of ``t`` below the smallest eigenvalue: the larger, the smaller the overshoot constant.
 LOSSES = (1e-5, 1e-2, 0.1, 0.5, 0.9, 0.99, 1.0)

@@ -17,13 +17,13 @@ import numpy as np
 from lmi.definiteness_proofs import prove_generalized_margin
 from lmi.dyadic import round_to_bits
 from ptcc_certify.graphs.structure import ClosedComponent, Structure
-from ptcc_certify.theorems.lemmas import left_vector
-from ptcc_certify.theorems.matrix_arithmetic import (
+from ptcc_certify.theorems.lemmas import (
     Matrix,
     exact_block,
     float_block,
     integer_matrix,
     integer_rows,
+    left_vector,
     multiply,
 )
 

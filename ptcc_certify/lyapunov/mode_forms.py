@@ -35,7 +35,7 @@ from ptcc_certify.lyapunov.error_system import rounded_matrix
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.search_failures import failures_told
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
-from ptcc_certify.theorems.matrix_arithmetic import Matrix
+from ptcc_certify.theorems.lemmas import Matrix
 
 #: Rows up to which forms are searched, of one mode and of all together, and modes.
 ROWS, ALL_ROWS, MODES = 24, 96, 12

@@ -28,7 +28,7 @@ from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.theorems.family_behaviour import FamilyComponent, moving_rest_state
 from ptcc_certify.theorems.kernel import Kernel, TooLarge
-from ptcc_certify.theorems.matrix_arithmetic import Matrix
+from ptcc_certify.theorems.lemmas import Matrix
 
 Vector = tuple[Fraction, ...]
 

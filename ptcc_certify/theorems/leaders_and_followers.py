@@ -23,18 +23,16 @@ from ptcc_certify.lyapunov.function import LyapunovBlock, LyapunovFunction, Matr
 from ptcc_certify.theorems.lemmas import (
     EXACT_NODES,
     algebraic_connectivity,
-    exact_left_vector,
-    left_vector,
-    unbalanced_diagonal,
-)
-from ptcc_certify.theorems.matrix_arithmetic import (
     congruence,
     diagonal_matrix,
     exact_block,
+    exact_left_vector,
     float_block,
     floats,
+    left_vector,
     rounded,
     symmetric_product,
+    unbalanced_diagonal,
     without_last,
 )
 from ptcc_certify.theorems.theorem import CONSTANT, ExactInterval, Obligation, RateProof, Theorem
