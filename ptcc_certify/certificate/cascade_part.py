@@ -31,7 +31,7 @@ from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.model import Protocol
 from ptcc_certify.model.agents import Agents
-from ptcc_certify.model.cascade import CascadeProtocol
+from ptcc_certify.model.agents_protocol import CascadeProtocol
 from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.theorems.theorem import Obligation
 

@@ -46,7 +46,7 @@ from ptcc_certify.checker.agent_instants import halvings, value_above
 from ptcc_certify.checker.agent_model import Cascade
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
-from ptcc_certify.model.cascade import CascadeProtocol
+from ptcc_certify.model.agents_protocol import CascadeProtocol
 from ptcc_certify.model.gain import Gain
 
 #: By this share what is formed in floats is enlarged.
