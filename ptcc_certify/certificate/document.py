@@ -80,9 +80,9 @@ from ptcc_certify.checker.theorem_function import PaperSection
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure, analyse
+from ptcc_certify.lyapunov.common_forms import Quotient
 from ptcc_certify.lyapunov.follower_rows import listeners
 from ptcc_certify.lyapunov.function import Dominance
-from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.slow_signals import SignalRateBound
 from ptcc_certify.model import Protocol
 from ptcc_certify.model.reaching_time import ReachingTime

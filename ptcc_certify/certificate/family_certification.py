@@ -42,9 +42,8 @@ from ptcc_certify.lyapunov.common_form_search import (
     aimed_functions,
     search_common_forms,
 )
-from ptcc_certify.lyapunov.common_forms import CommonForm
+from ptcc_certify.lyapunov.common_forms import CommonForm, Quotient
 from ptcc_certify.lyapunov.follower_function import follower_functions
-from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.slow_signals import prove_signal_rate_bound
 from ptcc_certify.lyapunov.squares_function import SquaresFunction, squares_function
 from ptcc_certify.model import Protocol

@@ -39,9 +39,8 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.structure import STABILITY
-from ptcc_certify.lyapunov.common_forms import CommonForm
+from ptcc_certify.lyapunov.common_forms import CommonForm, Quotient
 from ptcc_certify.lyapunov.follower_function import FollowerFunction
-from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.slow_signals import SignalRateBound
 from ptcc_certify.model.constrained_switching import SignalClass
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent

@@ -31,7 +31,7 @@ from ptcc_certify.errors import one_line
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure, behaviour_name
-from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.common_forms import Quotient
 from ptcc_certify.lyapunov.search import METHODS
 from ptcc_certify.lyapunov.slow_signals import Member, SignalRateBound, prove_again
 from ptcc_certify.model.base import Protocol

@@ -28,9 +28,8 @@ from lmi.search_time import checkpoint, part_of_time, share_of_time
 from ptcc_certify.checker.matrix_products import LARGEST_ROWS, WITH_MULTIPLIERS
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.size_limits import EXACT_NODES
-from ptcc_certify.lyapunov.common_forms import CommonForm, form_with_constants, prove_margin_about, prove_mode
+from ptcc_certify.lyapunov.common_forms import CommonForm, Quotient, form_with_constants, prove_margin_about, prove_mode
 from ptcc_certify.lyapunov.error_system import rounded_matrix
-from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.search_failures import failures_told
 from ptcc_certify.theorems.lemmas import Matrix, solve_exact
 

@@ -38,9 +38,8 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.structure import weak_components
 from ptcc_certify.lyapunov.common_form_search import search_common_forms
-from ptcc_certify.lyapunov.common_forms import CommonForm
+from ptcc_certify.lyapunov.common_forms import CommonForm, Quotient
 from ptcc_certify.lyapunov.interval_rows import IntervalRows, least_quotient
-from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.row_decay import FollowerDecay, follower_decays, follower_nodes, least_rate
 from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
 from ptcc_certify.theorems.kernel import UNKNOWN, Kernel, TooLarge

@@ -30,9 +30,8 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
 from ptcc_certify.lyapunov.common_form_search import search_common_forms
-from ptcc_certify.lyapunov.common_forms import CommonForm, form_with_constants, prove_ends, prove_mode
+from ptcc_certify.lyapunov.common_forms import CommonForm, Quotient, form_with_constants, prove_ends, prove_mode
 from ptcc_certify.lyapunov.error_system import rounded_matrix
-from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.search_failures import failures_told
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
 from ptcc_certify.theorems.lemmas import Matrix

@@ -376,7 +376,7 @@ def _bound_words(saved: Certificate) -> list[Markup]:
     bound, family = part.upper_bound, saved.family_proof.family
     assert bound is not None
     from ptcc_certify.certificate.unverified_section import upper_bound_entry
-    from ptcc_certify.lyapunov.quotient import Quotient
+    from ptcc_certify.lyapunov.common_forms import Quotient
 
     lines = []
     for member, duration in zip(

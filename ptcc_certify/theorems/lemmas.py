@@ -23,10 +23,11 @@ from ptcc_certify.graphs import size_limits as limits
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.graphs.structure import Structure, analyse
-from ptcc_certify.lyapunov.function import Matrix
 
 if TYPE_CHECKING:
     import flint
+
+    from ptcc_certify.lyapunov.function import Matrix
 
 EXACT_NODES, DENSE_NODES, FACTOR_NODES = limits.EXACT_NODES, limits.DENSE_NODES, limits.FACTOR_NODES
 #: Eigenvalues nearest to 0 that are computed, products spent on an inverse, and restarts of Arnoldi's method.

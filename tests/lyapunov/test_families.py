@@ -27,8 +27,7 @@ from ptcc_certify.lyapunov.common_form_search import (
     search_common_forms,
     undirected_function,
 )
-from ptcc_certify.lyapunov.common_forms import CommonForm, decay_matrices, prove_mode
-from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.common_forms import CommonForm, Quotient, decay_matrices, prove_mode
 from ptcc_certify.lyapunov.slow_signals import (
     SignalRateBound,
     prove_candidate,

@@ -360,7 +360,7 @@ def with_means(function: CommonForm, groups: Sequence[LeadingGroup]) -> CommonFo
     Examples
     --------
     >>> from ptcc_certify.lyapunov.common_form_search import search_common_forms
-    >>> from ptcc_certify.lyapunov.quotient import Quotient
+    >>> from ptcc_certify.lyapunov.common_forms import Quotient
     >>> from ptcc_certify.theorems.family_behaviour import decide
     >>> (component,) = decide(Family.from_intervals([("a", "b", 9, 11), ("b", "a", 9, 11)]))
     >>> V = with_means(search_common_forms(Quotient.of(component)).functions[0], leading_groups(component))

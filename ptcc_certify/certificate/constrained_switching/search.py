@@ -29,6 +29,7 @@ from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.rationals import writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
+from ptcc_certify.lyapunov.common_forms import Quotient
 from ptcc_certify.lyapunov.mode_forms import (
     ModeForms,
     search_mode_forms,
@@ -36,7 +37,6 @@ from ptcc_certify.lyapunov.mode_forms import (
     search_single_forms,
     within_reach,
 )
-from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.model import Protocol
 from ptcc_certify.model.constrained_switching import ClockShares, DwellTime, JointWindows, SignalClass
 from ptcc_certify.theorems.contractions import joint_behaviour, window_rate
