@@ -20,8 +20,7 @@ import lmi
 from lmi.exact.decimal_rounding import float_down, float_up
 from lmi.sparse_definiteness_proofs import SparseDefinitenessProof
 from ptcc_certify.checker.lyapunov_form import Form
-
-Matrix = list[list[Fraction]]
+from ptcc_certify.theorems.lemmas import Matrix
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,9 +19,10 @@ import lmi
 from lmi.definiteness_proofs import prove_generalized_margin, prove_margin, prove_positive_definite
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import ClosedComponent, Structure
-from ptcc_certify.lyapunov.function import LyapunovBlock, LyapunovFunction, Matrix
+from ptcc_certify.lyapunov.function import LyapunovBlock, LyapunovFunction
 from ptcc_certify.theorems.lemmas import (
     EXACT_NODES,
+    Matrix,
     algebraic_connectivity,
     congruence,
     diagonal_matrix,

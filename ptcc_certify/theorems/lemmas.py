@@ -27,8 +27,9 @@ from ptcc_certify.graphs.structure import Structure, analyse
 if TYPE_CHECKING:
     import flint
 
-    from ptcc_certify.lyapunov.function import Matrix
 
+#: A matrix of rationals, as lists of rows.
+Matrix = list[list[Fraction]]
 EXACT_NODES, DENSE_NODES, FACTOR_NODES = limits.EXACT_NODES, limits.DENSE_NODES, limits.FACTOR_NODES
 #: Eigenvalues nearest to 0 that are computed, products spent on an inverse, and restarts of Arnoldi's method.
 _NEAREST, _PRODUCTS, _RESTARTS = 8, 2000, 50
