@@ -18,14 +18,20 @@ from ptcc_certify.errors import ExitCode, ParameterError, one_line
 from ptcc_certify.graphs.declared_option import options_of
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import OPTIONAL, UNCERTAINTY
-from ptcc_certify.model.constrained_switching import CLOCK_DWELL, WINDOWS_OF_TIME, ClockShares, DwellTime, JointWindows
+from ptcc_certify.model.constrained_switching import (
+    CLOCK_DWELL,
+    WINDOWS_OF_TIME,
+    ClockShares,
+    DwellTime,
+    JointWindows,
+    SignalClass,
+)
 from ptcc_certify.model.refusals import NOT_OF_FAMILIES
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.model import Protocol
-    from ptcc_certify.model.constrained_switching import SignalClass
     from ptcc_certify.theorems.family_behaviour import FamilyComponent
 
 #: Options of certify that families do not take; agents are refused by themselves, disturbances by the protocol.

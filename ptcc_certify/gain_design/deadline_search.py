@@ -24,7 +24,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from math import comb, factorial, lcm
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lmi.errors import NoCertificate
 from lmi.exact.decimal_rounding import up
@@ -39,15 +39,13 @@ from ptcc_certify.certificate.certification import certify
 from ptcc_certify.errors import Change, ParameterError, gated
 from ptcc_certify.gain_design.answer import INFEASIBLE, MET, UNPROVED, AgentsDesign, refusal
 from ptcc_certify.gain_design.request import Request
+from ptcc_certify.graphs.digraph import Exact
 from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.graphs.rationals import short_exact, shorten
 from ptcc_certify.model import NominalProtocol, Protocol
 from ptcc_certify.model.agents import MOST_MOTION, Agents
 from ptcc_certify.model.asks import Asks, Expectations
 from ptcc_certify.model.parameters import parameter
-
-if TYPE_CHECKING:
-    from ptcc_certify.graphs.digraph import Exact
 
 #: A shortest time is found to one part in ``2^20``.
 _BITS = 20

@@ -39,7 +39,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -54,6 +54,7 @@ from ptcc_certify.checker.input_formulas import BITS, InitialSet, Linear
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.gain_design.answer import DIGITS, INFEASIBLE, MET, UNPROVED, Design, refusal
 from ptcc_certify.gain_design.request import DesignRequest, Fit, fit_of, input_bounds
+from ptcc_certify.graphs.digraph import Exact
 from ptcc_certify.graphs.rationals import nearest_float, shorten
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.model import NominalProtocol
@@ -61,9 +62,6 @@ from ptcc_certify.model.asks import Asks, Expectations
 from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.parameters import parameter
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
-
-if TYPE_CHECKING:
-    from ptcc_certify.graphs.digraph import Exact
 
 #: ``rho1 T / k`` is sought between these.
 _LEAST, _MOST = 1e-3, 1e6

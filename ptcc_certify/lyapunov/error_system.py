@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING
 
+import flint
 import numpy as np
 
 from lmi.definiteness_proofs import prove_generalized_margin
@@ -26,9 +26,6 @@ from ptcc_certify.theorems.lemmas import (
     left_vector,
     multiply,
 )
-
-if TYPE_CHECKING:
-    import flint
 
 #: Bits of the rounded factor of the exact basis.
 _BASIS_BITS = 53

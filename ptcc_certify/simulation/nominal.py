@@ -17,14 +17,13 @@ import numpy as np
 from ptcc_certify.errors import ParameterError, SimulationError, gated
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.model.disturbance import ExpressionDisturbance, SampledDisturbance, as_disturbance
-from ptcc_certify.model.limited_gain import Periods
+from ptcc_certify.model.limited_gain import LimitedGain, Periods
 from ptcc_certify.model.parameters import parameter, readable
 from ptcc_certify.simulation.cvodes import Forcing, Motion, Phase
 from ptcc_certify.simulation.instants import Instants
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
-    from ptcc_certify.model.limited_gain import LimitedGain, Periods
     from ptcc_certify.simulation.switched_motion import Course
 
 MAX_JUMPS = 10**4

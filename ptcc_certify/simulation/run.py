@@ -14,11 +14,12 @@ import inspect
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
 from ptcc_certify.errors import ParameterError, gated, unknown_parameter
+from ptcc_certify.graphs.digraph import Exact, SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import as_family, as_graph, as_states
 from ptcc_certify.graphs.io.conversion import is_family
@@ -41,9 +42,6 @@ from ptcc_certify.simulation.sliding import SlidingMotion, rounding_slack
 from ptcc_certify.simulation.switched_motion import Course
 from ptcc_certify.simulation.switching_signals import ConstantSignal, Signal, as_signal
 from ptcc_certify.simulation.trajectory import RESOLVED, Conditions, Played, Setup, Trajectory
-
-if TYPE_CHECKING:
-    from ptcc_certify.graphs.digraph import Exact, SignedDigraph
 
 
 class RunOptions(TypedDict, total=False):

@@ -30,8 +30,6 @@ from ptcc_certify.theorems.family_behaviour import FamilyComponent, mode_name
 if TYPE_CHECKING:
     from ptcc_certify.gain_design.answer import AgentsDesign, Design
     from ptcc_certify.graphs.digraph import SignedDigraph
-    from ptcc_certify.graphs.family import Family
-    from ptcc_certify.theorems.family_behaviour import FamilyComponent
 
 ORIENTATION = {
     "information": "row a,b: information flows a -> b",
