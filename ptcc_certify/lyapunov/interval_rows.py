@@ -169,14 +169,6 @@ class IntervalRows:
             gap = values[self.target] - values[self.source]
         return self._sums(np.where(gap < 0, high, low) * gap)
 
-    def pull_of(self, policy: Policy, values: np.ndarray) -> np.ndarray:
-        """Return ``sum_l |w_kl| (y_k - y_l)`` of every row, of integers, at the weights of a policy; exact."""
-        values = values.astype(object)
-        on = self.mode == policy.mode[self.target]
-        weights = np.where(policy.largest, self.upper, self.lower).astype(object)
-        total = self._sums(np.where(on, weights * (values[self.target] - values[self.source]), 0))
-        return total[policy.mode, np.arange(self.n)]
-
     def largest_pushes(self, values: np.ndarray) -> np.ndarray:
         """Return the largest ``sum_l |w_kl| y_l`` of every row, in every mode; ``y >= 0``, of floats or integers."""
         if values.dtype.kind == "f":

@@ -35,8 +35,7 @@ from lmi.sparse_h_matrix import solve
 from ptcc_certify.checker.constrained_switching import reachable_bounds
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float
-from ptcc_certify.graphs.structure import find_camps
-from ptcc_certify.lyapunov.interval_rows import IntervalRows, Policy, least_quotient
+from ptcc_certify.lyapunov.interval_rows import IntervalRows, least_quotient
 from ptcc_certify.lyapunov.row_decay import FollowerDecay, follower_decays, least_rate
 
 _ROUNDS = 60
@@ -62,16 +61,11 @@ class AttractingBox:
     decay : FollowerDecay
         ``nodes``, ``d`` and ``alpha``.
     lower, upper : tuple of n Fraction
-    attained : tuple of two tuples of n Fraction, or None
-        Some constant weights, with all agents outside at one of their ends, take agent ``k`` to at most the first and
-        at least the second. None where modes, weights that change together, or edges that keep no camps leave open how
-        much of the box is needed.
     """
 
     decay: FollowerDecay
     lower: tuple[Fraction, ...]
     upper: tuple[Fraction, ...]
-    attained: tuple[tuple[Fraction, ...], tuple[Fraction, ...]] | None = None
 
     def excess(self, x: Sequence[Fraction]) -> Fraction:
         """Return ``rho`` of the states of all agents; ``d`` in integers as in ``decay``.
@@ -212,7 +206,7 @@ def attracting_box(family: Family, decay: FollowerDecay, intervals: dict[int, In
     lifted = rows.lifted()
     unit, z = _outside(intervals)
     with np.errstate(all="ignore"):
-        y, policy = _largest(lifted, z)
+        y = _largest(lifted, z)
     if least_rate(rows, d) <= 0:
         raise ValueError("the vector proves no decay of these followers")
     v = np.tile(_repair(rows, d), 2)
@@ -221,13 +215,7 @@ def attracting_box(family: Family, decay: FollowerDecay, intervals: dict[int, In
     upper = _shifted(y, v, _missing(lifted.pull(np.concatenate([y, z])), lifted.pull(v_all)))
     if not (lifted.pull(np.concatenate([upper, z * 2**_PLACES])) >= 0).all():
         raise ArithmeticError("a row of a box fails, against what was proved")
-    fine = unit / 2**_PLACES
-    box = AttractingBox(decay, *_ends(upper, fine))
-    if not _is_attained(family, rows):
-        return box
-    pull = lifted.pull_of(policy, np.concatenate([y, z]))
-    surplus = _missing(-pull, lifted.pull_of(policy, v_all))
-    return replace(box, attained=_ends(_shifted(y, v, -surplus), fine))
+    return AttractingBox(decay, *_ends(upper, unit / 2**_PLACES))
 
 
 def _ends(y: np.ndarray, unit: Fraction) -> tuple[tuple[Fraction, ...], tuple[Fraction, ...]]:
@@ -246,8 +234,8 @@ def _outside(intervals: dict[int, Interval]) -> tuple[Fraction, np.ndarray]:
     return unit, np.array([-((-x / unit).__floor__()) for x in z], dtype=object)
 
 
-def _largest(lifted: IntervalRows, z: np.ndarray) -> tuple[np.ndarray, Policy]:
-    """Return ``y`` of the fixed point of the worst weights, in integers, and these weights."""
+def _largest(lifted: IntervalRows, z: np.ndarray) -> np.ndarray:
+    """Return ``y`` of the fixed point of the worst weights, in integers."""
     ends = z.astype(float)
     top = float(np.abs(ends).max(initial=0))
     y = np.full(lifted.n, max(float(ends.max(initial=0)), 0.0))
@@ -260,7 +248,7 @@ def _largest(lifted: IntervalRows, z: np.ndarray) -> tuple[np.ndarray, Policy]:
             break
         policy = new
     y = np.where(np.isfinite(y), y, top)
-    return np.array([int(v) for v in np.rint(y).tolist()], dtype=object), policy
+    return np.array([int(v) for v in np.rint(y).tolist()], dtype=object)
 
 
 def _repair(rows: IntervalRows, d: np.ndarray) -> np.ndarray:
@@ -288,16 +276,5 @@ def _missing(pull: np.ndarray, spare: np.ndarray) -> Fraction:
 
 
 def _shifted(y: np.ndarray, v: np.ndarray, e: Fraction) -> np.ndarray:
-    """Return integers ``2^_PLACES (y + e v)``, ``e`` rounded away from 0."""
-    steps = -((-abs(e) * 2**_PLACES).__floor__())
-    return y.astype(object) * 2**_PLACES + (steps if e > 0 else -steps) * v.astype(object)
-
-
-def _is_attained(family: Family, rows: IntervalRows) -> bool:
-    """Tell whether constant weights attain the box: one mode, independent weights, camps of all edges into it."""
-    if rows.modes > 1:
-        return False
-    if family.modes[0].tied and (rows.lower != rows.upper)[rows.source < rows.n].any():
-        return False
-    _, violated, _ = find_camps(rows.n + rows.outside, rows.source, rows.target, rows.sign)
-    return violated.size == 0
+    """Return integers ``2^_PLACES (y + e v)``, ``e >= 0`` rounded up."""
+    return y.astype(object) * 2**_PLACES - (-e * 2**_PLACES).__floor__() * v.astype(object)
