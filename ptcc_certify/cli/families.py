@@ -208,7 +208,7 @@ def _show_decision(
     screen: Screen,
     options: shared.Options,
 ) -> None:
-    from ptcc_certify.certificate.classification_document import decision_document
+    from ptcc_certify.certificate.graph_sections import decision_document
     from ptcc_certify.report.facts.graph import decision_facts
 
     if as_json:
