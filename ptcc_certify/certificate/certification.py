@@ -22,9 +22,9 @@ from ptcc_certify.certificate.assessment import rejects
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_certification import certify_family, refuse_signals
 from ptcc_certify.certificate.family_proof import FamilyProof
-from ptcc_certify.certificate.final_state_sections import stated_ends
 from ptcc_certify.certificate.graph_certification import STEPS, GraphSteps, with_agents
 from ptcc_certify.certificate.graph_proof import GraphProof
+from ptcc_certify.certificate.graph_sections import stated_ends
 from ptcc_certify.certificate.request import (
     Question,
     listener,

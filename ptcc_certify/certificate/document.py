@@ -18,7 +18,6 @@ from ptcc_certify.certificate.constrained_switching.claims import Claim
 from ptcc_certify.certificate.constrained_switching.sections import ball, claim_section, claim_steps, read_claim
 from ptcc_certify.certificate.evidence import Evidence, Observations
 from ptcc_certify.certificate.family_proof import ComponentProof, FamilyProof
-from ptcc_certify.certificate.final_state_sections import final_state_sections, formation_section, read_final_state
 from ptcc_certify.certificate.functions import (
     ProvedFunction,
     _dominance_witness,
@@ -43,7 +42,10 @@ from ptcc_certify.certificate.graph_sections import (
     claim_witnesses,
     family_claim_sections,
     family_section,
+    final_state_sections,
+    formation_section,
     graph_section,
+    read_final_state,
     structure_section,
 )
 from ptcc_certify.certificate.proof import Proof, Source
