@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ptcc_certify.errors import ParameterError, gated
-from ptcc_certify.graphs.array_holders import ByValue
 from ptcc_certify.graphs.labels import import_pandas, position
+from ptcc_certify.graphs.packed_weights import ByValue
 from ptcc_certify.graphs.rationals import number_within, shorten
 from ptcc_certify.lazy_report import Shown, rendered
 from ptcc_certify.model.gain_limits import GainLimits
