@@ -37,11 +37,11 @@ from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.model.agents import plant_text
 from ptcc_certify.report import html_text as texts
 from ptcc_certify.report.facts.agents import claimed_of
-from ptcc_certify.report.facts.beside_law import beside_law
 from ptcc_certify.report.facts.claim import assumptions
 from ptcc_certify.report.facts.constrained_switching import signal_text
 from ptcc_certify.report.facts.decay import BOUND_KINDS
 from ptcc_certify.report.facts.graph import leader_facts
+from ptcc_certify.report.facts.late import beside_law
 from ptcc_certify.report.facts.of_certificate import facts_of
 from ptcc_certify.report.html_text import rational
 from ptcc_certify.report.page_figures import Counterexamples, counterexamples, draw, inline_figure, run_of_agents
