@@ -20,12 +20,11 @@ import numpy as np
 
 from lmi.errors import LMIError
 from lmi.exact.decimal_rounding import float_up, up
-from ptcc_certify.bounds.delay.case import LARGEST_EXPONENT, LateCase, asked_leaders, read_leaders
+from ptcc_certify.bounds.delay.case import LARGEST_EXPONENT, LateCase, Settling, asked_leaders, read_leaders
 from ptcc_certify.bounds.delay.certain_misses import Missed, find_missed, stage_deadlines
 from ptcc_certify.bounds.delay.decay_by_rows import LOSSES_CLIPPED, MORE, RowBound, away, search_rows
 from ptcc_certify.bounds.delay.decay_by_steps import Steps, bound_steps, search_steps
 from ptcc_certify.bounds.delay.delay_lmi import DelayLMIBound
-from ptcc_certify.bounds.delay.followers_of_groups import Settling
 from ptcc_certify.bounds.delay.forms_of_families import FamilyForm
 from ptcc_certify.bounds.delay.small_delays import SmallDelays
 from ptcc_certify.bounds.float_conversion import floats, floats_up
