@@ -15,7 +15,7 @@ from matplotlib.figure import Figure, SubFigure
 
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.fact import Fact
-from ptcc_certify.certificate.tube import tube_of
+from ptcc_certify.certificate.graph_proof import tube_of
 from ptcc_certify.errors import ParameterError, SimulationError, spell
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, LABELLED_NODES, REPEATED_NODES
 from ptcc_certify.report.facts.claim import assumptions
