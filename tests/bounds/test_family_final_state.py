@@ -24,7 +24,7 @@ from ptcc_certify.bounds.final_state.attracting_box import AttractingBox, attrac
 from ptcc_certify.bounds.final_state.constant_weights import value_ends
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.lyapunov.row_decay import follower_decay
+from ptcc_certify.lyapunov.follower_function import follower_decay
 
 # ---------------------------------------------------------------------- constant weights
 

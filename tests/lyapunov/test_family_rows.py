@@ -13,15 +13,15 @@ from scipy.linalg import expm
 
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.common_form_search import common_left_vector
-from ptcc_certify.lyapunov.follower_function import follower_functions
-from ptcc_certify.lyapunov.interval_rows import IntervalRows
-from ptcc_certify.lyapunov.row_decay import (
+from ptcc_certify.lyapunov.follower_function import (
     FollowerDecay,
     follower_decay,
+    follower_functions,
     follower_nodes,
     least_rate,
     prove_follower_decay,
 )
+from ptcc_certify.lyapunov.interval_rows import IntervalRows
 from ptcc_certify.theorems.family_behaviour import decide
 
 KINDS = ("stability", "bipartite consensus", "bipartite containment")

@@ -5,7 +5,8 @@ Let the agents outside ``F`` stay in ``[l_j, u_j]`` from the beginning, and nobo
 
     sum_l |w_kl| (u_k - y_l)  >=  0        at w+ where y_l > u_k, at w- elsewhere,
 
-and the mirror image for ``-l``, and let ``d``, ``alpha`` be those of :mod:`ptcc_certify.lyapunov.row_decay`. Then
+and the mirror image for ``-l``, and let ``d``, ``alpha`` be a decay of rows,
+:mod:`ptcc_certify.lyapunov.follower_function`. Then
 
     rho = max_k max(0, (x_k - u_k) / d_k, (l_k - x_k) / d_k)    decays with e^(-alpha s) for every signal:
 
@@ -35,8 +36,8 @@ from lmi.sparse_h_matrix import solve
 from ptcc_certify.checker.constrained_switching import reachable_bounds
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float
+from ptcc_certify.lyapunov.follower_function import FollowerDecay, follower_decays, least_rate
 from ptcc_certify.lyapunov.interval_rows import IntervalRows, least_quotient
-from ptcc_certify.lyapunov.row_decay import FollowerDecay, follower_decays, least_rate
 
 _ROUNDS = 60
 #: Binary places of the ends, against the largest of them.
@@ -72,7 +73,7 @@ class AttractingBox:
 
         Examples
         --------
-        >>> from ptcc_certify.lyapunov.row_decay import follower_decay
+        >>> from ptcc_certify.lyapunov.follower_function import follower_decay
         >>> family = Family.from_intervals([("a", "b", 1, 2)])
         >>> box = attracting_box(family, follower_decay(family), {0: (Fraction(0), Fraction(1))})
         >>> box.upper[0] >= 1, float(box.excess([Fraction(0), box.upper[0] + 3 * int(box.decay.vector[0])]))
@@ -192,7 +193,7 @@ def attracting_box(family: Family, decay: FollowerDecay, intervals: dict[int, In
 
     Examples
     --------
-    >>> from ptcc_certify.lyapunov.row_decay import follower_decay
+    >>> from ptcc_certify.lyapunov.follower_function import follower_decay
     >>> family = Family.from_intervals([("a", "c", 1, 3), ("b", "c", 1, 1)], nodes="abc")
     >>> ends = {0: (Fraction(0), Fraction(0)), 1: (Fraction(4), Fraction(4))}
     >>> box = attracting_box(family, follower_decay(family), ends)
