@@ -72,7 +72,7 @@ _EXPORTS = {
     "telegraph_noise": "model.disturbance",
     "GainLimits": "model.gain_limits",
     "LateMessages": "model.late_messages",
-    "MovingLeaders": "model.moving_leaders",
+    "MovingLeaders": "model.late_messages",
     # Runs
     "simulate": "simulation.run",
     "Bounded": "simulation.nominal",

@@ -49,8 +49,7 @@ from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.case import Case
 from ptcc_certify.model.constrained_switching import SignalClass
-from ptcc_certify.model.late_messages import LateMessages
-from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 from ptcc_certify.model.refusals import (
     asked_of_signals,
     refuse_agents,

@@ -14,8 +14,7 @@ from ptcc_certify.certificate.request import Expectations, Question, Request
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.model import Protocol
-from ptcc_certify.model.late_messages import LateMessages
-from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 from ptcc_certify.model.reaching_time import ReachingTime
 
 

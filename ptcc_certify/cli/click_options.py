@@ -22,8 +22,7 @@ from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.asks import Asks, Expectations, InitialState, Run
 from ptcc_certify.model.constrained_switching import CLOCK_DWELL, ClockShares, DwellTime, JointWindows
 from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.late_messages import LateMessages
-from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 
 Decorator = Callable[[Any], Any]
 

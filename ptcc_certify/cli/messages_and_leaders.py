@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ptcc_certify.cli.click_options import flag_of, given_of, names_of, options_for
 from ptcc_certify.cli.options import Options, graph_file
 from ptcc_certify.errors import NumberError, ParameterError
-from ptcc_certify.model.late_messages import LateMessages
-from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 from ptcc_certify.model.parameters import parameter
 
 if TYPE_CHECKING:

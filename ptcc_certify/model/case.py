@@ -15,8 +15,7 @@ from ptcc_certify.model.asks import Asks, InitialState
 from ptcc_certify.model.base import Protocol
 from ptcc_certify.model.constrained_switching import SignalClass
 from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.late_messages import LateMessages, told_leaders
-from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders, told_leaders
 from ptcc_certify.model.parameters import parameter
 
 

@@ -14,8 +14,7 @@ from ptcc_certify.model.base import Protocol, refuse_no_protocol
 if TYPE_CHECKING:
     from ptcc_certify.graphs.structure import Structure
     from ptcc_certify.model.case import Case
-    from ptcc_certify.model.late_messages import LateMessages
-    from ptcc_certify.model.moving_leaders import MovingLeaders
+    from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 
 #: What is asked of one graph alone.
 NOT_OF_FAMILIES = (*("at", "initial_set", "limits", "delta", "noise", "agents", "simulation", "disturbance"),)

@@ -28,9 +28,8 @@ from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.model.base import Protocol, refuse_no_protocol
 from ptcc_certify.model.gain import Gain
 from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.late_messages import LateMessages, told_leaders
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders, told_leaders
 from ptcc_certify.model.limited_gain import LimitedGain
-from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.refusals import refuse_together
 from ptcc_certify.simulation.cvodes import Tolerances
 from ptcc_certify.simulation.instants import MOST_STEPS, STEP_SHARE, Instants, steps_towards

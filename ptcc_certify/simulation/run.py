@@ -28,8 +28,7 @@ from ptcc_certify.model import Protocol
 from ptcc_certify.model.base import refuse_no_protocol
 from ptcc_certify.model.disturbance import StateDependent, as_disturbance
 from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.late_messages import LateMessages, told_leaders
-from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders, told_leaders
 from ptcc_certify.model.refusals import refuse_together
 from ptcc_certify.simulation.cvodes import Motion, Tolerances
 from ptcc_certify.simulation.instants import PAST, default_instants, wanted_instants

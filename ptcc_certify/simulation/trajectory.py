@@ -27,9 +27,8 @@ if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.model import Protocol, ReachingProtocol
-    from ptcc_certify.model.late_messages import LateMessages
+    from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
     from ptcc_certify.model.limited_gain import LimitedGain
-    from ptcc_certify.model.moving_leaders import MovingLeaders
     from ptcc_certify.model.virtual_positions import TrackingProtocol
     from ptcc_certify.simulation.cvodes import Tolerances
 

@@ -30,9 +30,8 @@ if TYPE_CHECKING:
 
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.model.base import Protocol
-    from ptcc_certify.model.late_messages import LateMessages
+    from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
     from ptcc_certify.model.limited_gain import LimitedGain
-    from ptcc_certify.model.moving_leaders import MovingLeaders
     from ptcc_certify.model.virtual_positions import TrackingProtocol
     from ptcc_certify.simulation.cvodes import Phase
     from ptcc_certify.simulation.trajectory import Trajectory

@@ -30,9 +30,8 @@ from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.follower_rows import leading_group, listeners
 from ptcc_certify.model.base import Protocol
 from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 from ptcc_certify.model.limited_gain import LimitedGain
-from ptcc_certify.model.moving_leaders import MovingLeaders
 
 #: The largest exponent of what grows, in floats.
 LARGEST_EXPONENT = 600

@@ -1,6 +1,6 @@
 """What holds with late messages and moving leaders: what is left at the deadline, by every kind of proof; stages.
 
-Agents obey :mod:`ptcc_certify.model.late_messages` and :mod:`ptcc_certify.model.moving_leaders`. Followers of single
+Agents obey :mod:`ptcc_certify.model.late_messages` and :mod:`ptcc_certify.model.late_messages`. Followers of single
 leaders are bounded row by row
 (:mod:`ptcc_certify.bounds.delay.decay_by_rows`) and from instant to instant
 (:mod:`ptcc_certify.bounds.delay.decay_by_steps`), all agents by a Lyapunov function of the whole graph.
@@ -50,9 +50,8 @@ from ptcc_certify.graphs.family import Family, pairs_of
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
 from ptcc_certify.model.base import Protocol
-from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 from ptcc_certify.model.limited_gain import LimitedGain
-from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.virtual_positions import TrackingProtocol, Vehicles
 from ptcc_certify.theorems.theorem import Obligation
 

@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     from ptcc_certify.bounds.delay.late_messages import LateBounds
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.model.base import Protocol
-    from ptcc_certify.model.late_messages import LateMessages
-    from ptcc_certify.model.moving_leaders import MovingLeaders
+    from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 
 #: From where bounds are that no initial state is given for.
 FROM_WITHIN_1 = ", from within 1 of it at first"
