@@ -123,7 +123,7 @@ def cite(theorem: tuple[str, ...]) -> int:
 
     software prints that of this program.
     """
-    from ptcc_certify.certificate.certificate_file import RejectedCertificate
+    from ptcc_certify.certificate.certificate import RejectedCertificate
     from ptcc_certify.theorems.table import cite as bibtex
     from ptcc_certify.theorems.table import cite_software
 

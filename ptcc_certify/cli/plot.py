@@ -117,7 +117,7 @@ def plot(
     Of a family - its certificate, or several graphs with --switching, weights in intervals, --uncertainty, --optional -
     runs under many signals are drawn within what is proved for every signal.
     """
-    from ptcc_certify.certificate.certificate_file import RejectedCertificate
+    from ptcc_certify.certificate.certificate import RejectedCertificate
 
     certified = kind_of(graph[0]) in ("a certificate", "JSON")
     if certified and len(graph) > 1:

@@ -146,8 +146,7 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
 
 def _of_certificate(graph: tuple[str, ...], output: str | None, samples: int, look: dict[str, Any]) -> int:
     """Write the run of what a certificate is about, which is checked first, at as many instants as that of a graph."""
-    from ptcc_certify.certificate.certificate import read_certificate
-    from ptcc_certify.certificate.certificate_file import RejectedCertificate
+    from ptcc_certify.certificate.certificate import RejectedCertificate, read_certificate
 
     shared.refuse_beside_certificate(graph[0], ("graph", "output", *look))
     if len(graph) > 1:

@@ -24,8 +24,7 @@ import jinja2
 from markupsafe import Markup
 
 from lmi.exact.decimal_rounding import counted
-from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.certificate_file import RejectedCertificate
+from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate
 from ptcc_certify.certificate.constrained_switching.bounds import nearer_for_signal
 from ptcc_certify.certificate.fact import Fact
 from ptcc_certify.certificate.runs_against_bounds import compare

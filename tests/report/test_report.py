@@ -46,8 +46,7 @@ from ptcc_certify import (
     certify,
     design,
 )
-from ptcc_certify.certificate.certificate import read_certificate
-from ptcc_certify.certificate.certificate_file import RejectedCertificate
+from ptcc_certify.certificate.certificate import RejectedCertificate, read_certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.io import read_graph
