@@ -16,9 +16,8 @@ from ptcc_certify.graphs.rationals import as_fraction, format_exact, shorten, wh
 from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.graphs.structure import behaviour_name
 from ptcc_certify.model import Protocol
-from ptcc_certify.model.asks import Asks, InitialState
+from ptcc_certify.model.asks import Asks, Case, InitialState
 from ptcc_certify.model.base import refuse_no_protocol
-from ptcc_certify.model.case import Case
 from ptcc_certify.model.disturbance import as_disturbance
 from ptcc_certify.model.parameters import parameter
 from ptcc_certify.model.refusals import refuse_before_the_graph

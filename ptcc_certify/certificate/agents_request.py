@@ -19,8 +19,7 @@ from ptcc_certify.graphs.io.states import as_states, random_states
 from ptcc_certify.graphs.rationals import shorten, writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.model.agents import DERIVATIVES, MOST_DIMENSION, PLURALS, Agents
-from ptcc_certify.model.asks import InitialState
-from ptcc_certify.model.case import Case
+from ptcc_certify.model.asks import Case, InitialState
 from ptcc_certify.model.gain import Gain
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.parameters import readable

@@ -46,8 +46,7 @@ from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, analys
 from ptcc_certify.lyapunov.follower_rows import leading_group, listeners, refuse_other_targets
 from ptcc_certify.model import Protocol
 from ptcc_certify.model.agents import Agents
-from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.case import Case
+from ptcc_certify.model.asks import Asks, Case
 from ptcc_certify.model.constrained_switching import SignalClass
 from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 from ptcc_certify.model.refusals import (

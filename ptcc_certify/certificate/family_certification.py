@@ -47,7 +47,7 @@ from ptcc_certify.lyapunov.follower_function import follower_functions
 from ptcc_certify.lyapunov.slow_signals import prove_signal_rate_bound
 from ptcc_certify.lyapunov.squares_function import SquaresFunction, squares_function
 from ptcc_certify.model import Protocol
-from ptcc_certify.model.case import Case
+from ptcc_certify.model.asks import Case
 from ptcc_certify.model.constrained_switching import ClockShares, JointWindows, read_signal
 from ptcc_certify.model.reaching_time import ReachingTime
 from ptcc_certify.theorems.contractions import refuse_impossible_windows

@@ -17,8 +17,7 @@ from ptcc_certify.cli.scenario import MEMORY, graph_of, refuse_beside
 from ptcc_certify.cli.terminal import FIGURES, print_lines, progress, refuse_output
 from ptcc_certify.errors import ExitCode, ParameterError
 from ptcc_certify.graphs.recognised_files import kind_of
-from ptcc_certify.model.asks import Asks, InitialState
-from ptcc_certify.model.case import Case
+from ptcc_certify.model.asks import Asks, Case, InitialState
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate

@@ -30,8 +30,7 @@ from ptcc_certify.graphs.io.packaged import GRAPHS
 from ptcc_certify.graphs.reading import Reading, option_flags
 from ptcc_certify.graphs.size_limits import EXPLORED_NODES
 from ptcc_certify.model import Protocol, SlidingModeProtocol
-from ptcc_certify.model.asks import Asks, InitialState
-from ptcc_certify.model.case import Case
+from ptcc_certify.model.asks import Asks, Case, InitialState
 from ptcc_certify.model.disturbance import Disturbance, as_disturbance
 from ptcc_certify.model.reaching_time import certified_reaching_times
 from ptcc_certify.model.refusals import refuse_before_the_graph
