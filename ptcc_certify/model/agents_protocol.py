@@ -11,10 +11,9 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import near
 from ptcc_certify.graphs.io import as_graph
-from ptcc_certify.model.base import Protocol, aligned, position_latex
+from ptcc_certify.model.base import Protocol, aligned, coupling, position_latex
 from ptcc_certify.model.casadi_latex import to_latex
 from ptcc_certify.model.gain import Gain
-from ptcc_certify.model.nominal import coupling
 
 if TYPE_CHECKING:
     import casadi as ca

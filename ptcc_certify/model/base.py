@@ -7,14 +7,16 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import ParameterError, gated
+from ptcc_certify.graphs.declared_option import option
 from ptcc_certify.graphs.rationals import format_exact, shorten
-from ptcc_certify.model.parameters import Parameters
+from ptcc_certify.model.casadi_latex import to_latex
+from ptcc_certify.model.parameters import NotNegative, Parameters, Positive
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -212,3 +214,167 @@ def position_latex(index: int | str, places: bool) -> str:
 def aligned(rows: list[str]) -> str:
     """Return equations in LaTeX, one below the other."""
     return "\\begin{aligned}\n" + " \\\\\n".join(rows) + "\n\\end{aligned}"
+
+
+_LATEX_NODES = 20
+
+
+@gated
+@dataclass(frozen=True, repr=False)
+class NominalProtocol(Protocol):
+    """The nominal protocol (4) of the paper: every agent steers by what it hears from those it listens to.
+
+        u_k = gain(t) sum_l w_kl (x_l - sign(w_kl) x_k),
+        gain(t) = rho1 + rho2 kappa/(T - t)  before T,  rho1 from T on
+
+    The agents settle at ``T``, whatever the initial state. ``rho2 = 0`` is allowed: then the gain is constant and they
+    settle only as ``t`` goes to infinity (the asymptotic baseline).
+
+    Parameters
+    ----------
+    T, rho1, kappa : int, float, str or Fraction
+        Positive; kept as exact rationals, a text obeys the exact grammar. ``T`` in units of time, ``rho1`` in
+        1/time/weight. The defaults are those of the command line.
+    rho2 : int, float, str or Fraction
+        Not negative, 1/weight.
+
+    Raises
+    ------
+    ParameterError
+        Names the parameter, its value and its domain.
+
+    Examples
+    --------
+    >>> protocol = NominalProtocol(T="0.6", rho1="0.1", rho2="0.3", kappa=1)
+    >>> protocol
+    NominalProtocol(T=3/5, rho1=1/10, rho2=3/10, kappa=1)
+    >>> protocol.to_dict()
+    {'kind': 'nominal', 'T': '3/5', 'rho1': '1/10', 'rho2': '3/10', 'kappa': '1'}
+    """
+
+    section: ClassVar = "protocol"
+    kind = "nominal"
+    T: Positive = option("--T", "Nominal: the deadline.", Positive(1), unit="time")
+    rho1: Positive = option("--rho1", "Constant part of the gain.", Positive(1))
+    rho2: NotNegative = option("--rho2", "Factor of the growing part of the gain.", NotNegative(1))
+    kappa: Positive = option("--kappa", "Exponent of the time scaling.", Positive(2), example="2")
+
+    def __post_init__(self) -> None:
+        _ = self.gain  # refuses what is beyond float64
+
+    def input(self, graph: Any, x: ca.SX | None = None, t: ca.SX | None = None) -> ca.SX:
+        """Return ``u = gain(t) E``, ``E = -L x``, as a CasADi expression.
+
+        Parameters
+        ----------
+        graph : graph-like
+            N agents.
+        x : (N, 1) casadi.SX, optional
+            The states; symbols ``x1 .. xN`` by default.
+        t : casadi.SX, optional
+            The instant, in units of time; the symbol ``t`` by default.
+
+        Returns
+        -------
+        (N, 1) casadi.SX
+
+        Examples
+        --------
+        >>> pair = SignedDigraph.from_edges([(1, 2, -3)])
+        >>> NominalProtocol(T=1, rho1=2, rho2=0, kappa=1).input(pair)
+        SX([0, (-6*(x1+x2))])
+        """
+        import casadi as ca
+
+        from ptcc_certify.graphs.io import as_graph
+
+        graph = as_graph(graph)
+        x, t = symbols("x", graph) if x is None else x, ca.SX.sym("t") if t is None else t
+        return self.gain.expression(t) * coupling(graph, x)
+
+    def closed_loop(self, graph: Any) -> dict[str, ca.SX]:
+        """Return ``x' = u`` on ``graph`` as CasADi's ``{"t", "x", "ode"}``, for ``casadi.integrator`` (before ``T``).
+
+        Examples
+        --------
+        >>> loop = NominalProtocol(T=1, rho1=2, rho2=0, kappa=1).closed_loop(SignedDigraph.from_edges([(1, 2, 3)]))
+        >>> loop["x"], loop["ode"]
+        (SX([x1, x2]), SX([0, (6*(x1-x2))]))
+        """
+        import casadi as ca
+
+        from ptcc_certify.graphs.io import as_graph
+
+        graph = as_graph(graph)
+        x, t = symbols("x", graph), ca.SX.sym("t")
+        return {"t": t, "x": x, "ode": self.input(graph, x, t)}
+
+    def latex(self, graph: Any = None, places: bool = False) -> str:
+        r"""Return the protocol in LaTeX, printed from its expressions: for an agent k, or for every agent of a graph.
+
+        Parameters
+        ----------
+        graph : graph-like, optional
+            At most 20 nodes. Agents are numbered from 1 in the order of ``graph.labels``, and the parameters are
+            numbers; without a graph they are letters.
+        places : bool
+            Of agents in a formation: ``x_k - h_k`` in place of ``x_k``.
+
+        Raises
+        ------
+        ParameterError
+            The graph has more than 20 nodes.
+
+        Examples
+        --------
+        >>> protocol = NominalProtocol(T=1, rho1=2, rho2=3, kappa=1)
+        >>> print(protocol.latex())
+        \begin{aligned}
+        u_{k} &= \sum_{l=1}^{N} g w_{kl} \left(x_{l} - \operatorname{sign}\left(w_{kl}\right) x_{k}\right) \\
+        g &= \begin{cases} \rho_{1} + \frac{\rho_{2} \kappa}{T - t}, & t < T \\ \rho_{1}, & t \ge T \end{cases}
+        \end{aligned}
+        >>> print(protocol.latex(SignedDigraph.from_edges([(1, 2, -3), (2, 1, 1)])))
+        \begin{aligned}
+        u_{1} &= g \left(x_{2} - x_{1}\right) \\
+        u_{2} &= g \left(-3 \left(x_{1} + x_{2}\right)\right) \\
+        g &= \begin{cases} 2 + \frac{3}{1 - t}, & t < 1 \\ 2, & t \ge 1 \end{cases}
+        \end{aligned}
+        """
+        rows = nominal_rows(graph, places=places)
+        return aligned([*rows, f"g &= {self.gain.latex(numbers=graph is not None)}"])
+
+
+def nominal_rows(graph: Any, mark: str = "", places: bool = False) -> list[str]:
+    """Return the rows of the nominal input, of an agent k or of every agent; ``mark`` is put behind each ``u``."""
+    import casadi as ca
+
+    from ptcc_certify.graphs.io import as_graph
+
+    g = ca.SX.sym("g")
+    if graph is None:
+        names = ("w_kl", position_latex("k", places), position_latex("l", places))
+        summand = g * _pull(*map(ca.SX.sym, names))
+        return [rf"u_{{k}}{mark} &= \sum_{{l=1}}^{{N}} {to_latex(summand)}"]
+    graph = as_graph(graph)
+    if graph.n_nodes > _LATEX_NODES:
+        raise ParameterError(f"LaTeX of {graph.n_nodes} agents is too long; the limit is {_LATEX_NODES} nodes")
+    states = ca.vertcat(*(ca.SX.sym(position_latex(k + 1, places)) for k in range(graph.n_nodes)))
+    inputs = g * coupling(graph, states)
+    return [rf"u_{{{k + 1}}}{mark} &= {to_latex(inputs[k])}" for k in range(graph.n_nodes)]
+
+
+def _pull(weight: Any, listener: ca.SX, source: ca.SX) -> ca.SX:
+    """``w_kl (x_l - sign(w_kl) x_k)``: how source l moves listener k."""
+    import casadi as ca
+
+    return weight * (source - ca.sign(weight) * listener)
+
+
+def coupling(graph: SignedDigraph, x: ca.SX) -> ca.SX:
+    """``E``, the sum of the containment weights on every agent."""
+    import casadi as ca
+
+    entries = [ca.SX(0)] * graph.n_nodes
+    for k, source, weight in zip(graph.target.tolist(), graph.source.tolist(), graph.weights.tolist(), strict=True):
+        entries[k] = entries[k] + _pull(weight, x[k], x[source])
+    return ca.vertcat(*entries)

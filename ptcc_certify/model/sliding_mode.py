@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from lmi.exact.decimal_rounding import near
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.declared_option import option
-from ptcc_certify.model.base import ReachingProtocol, aligned, position_latex, symbols
+from ptcc_certify.model.base import NominalProtocol, ReachingProtocol, aligned, nominal_rows, position_latex, symbols
 from ptcc_certify.model.casadi_latex import to_latex
-from ptcc_certify.model.nominal import NominalProtocol, nominal_rows
 from ptcc_certify.model.parameters import NotNegative, Positive
 
 if TYPE_CHECKING:
