@@ -25,7 +25,7 @@ from ptcc_certify.certificate.evidence import Evidence
 from ptcc_certify.certificate.fact import Fact
 from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.graph_proof import GraphProof
-from ptcc_certify.certificate.proof import Source
+from ptcc_certify.certificate.request import Source
 from ptcc_certify.certificate.section_io import read_side_files
 from ptcc_certify.certificate.verdict import assess
 from ptcc_certify.checker import CheckReport, VerifiedObligation

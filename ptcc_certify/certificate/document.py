@@ -48,8 +48,7 @@ from ptcc_certify.certificate.graph_sections import (
     read_final_state,
     structure_section,
 )
-from ptcc_certify.certificate.proof import Proof, Source
-from ptcc_certify.certificate.request import Question
+from ptcc_certify.certificate.request import Proof, Question, Source
 from ptcc_certify.certificate.section_io import Reader, Writer, write
 from ptcc_certify.certificate.unverified_section import (
     nothing_proved,

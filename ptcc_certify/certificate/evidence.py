@@ -17,8 +17,7 @@ from ptcc_certify.bounds.final_state.of_graph import FinalState, final_state
 from ptcc_certify.bounds.instants import remaining_part
 from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.graph_proof import GraphProof
-from ptcc_certify.certificate.proof import OfQuestion
-from ptcc_certify.certificate.request import Question
+from ptcc_certify.certificate.request import OfQuestion, Question
 from ptcc_certify.errors import ParameterError, PTCCError, SimulationError, did_you_mean, unknown_parameter
 from ptcc_certify.lazy_report import Shown
 from ptcc_certify.lyapunov.search import Search

@@ -30,7 +30,7 @@ from ptcc_certify.certificate.constrained_switching.claims import (
     WindowClaim,
 )
 from ptcc_certify.certificate.functions import ProvedFunction
-from ptcc_certify.certificate.proof import Proof
+from ptcc_certify.certificate.request import Proof
 from ptcc_certify.checker.common_kernel_ends import agents_heard, limits
 from ptcc_certify.checker.protocol import last_time, sliding_bounded, sliding_part
 from ptcc_certify.checker.reading import Interval

@@ -34,8 +34,7 @@ from ptcc_certify.certificate.agents_request import (
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.evidence import Observations
 from ptcc_certify.certificate.graph_proof import GraphProof
-from ptcc_certify.certificate.proof import OfQuestion
-from ptcc_certify.certificate.request import Question
+from ptcc_certify.certificate.request import OfQuestion, Question
 from ptcc_certify.certificate.verdict import MANY_DECADES
 from ptcc_certify.errors import HypothesisError, ParameterError, SimulationError
 from ptcc_certify.graphs.digraph import SignedDigraph

@@ -26,7 +26,7 @@ from ptcc_certify.bounds.input.effort import Effort
 from ptcc_certify.bounds.input.effort_bounds import InputRequest, bound_effort, full_constants
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
-from ptcc_certify.certificate.proof import Proof
+from ptcc_certify.certificate.request import Proof
 from ptcc_certify.checker import INPUT_NODES
 from ptcc_certify.checker.final_state import AgentsVector
 from ptcc_certify.checker.lyapunov_form import Form

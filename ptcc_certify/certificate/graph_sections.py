@@ -13,7 +13,7 @@ from ptcc_certify.bounds.final_state.enclosed_ends import agents_ends, influence
 from ptcc_certify.bounds.final_state.of_graph import FinalState, Influence, rounding_radius
 from ptcc_certify.bounds.float_conversion import numbers
 from ptcc_certify.certificate.graph_proof import GraphProof
-from ptcc_certify.certificate.proof import Proof
+from ptcc_certify.certificate.request import Proof
 from ptcc_certify.certificate.section_io import LONG, Writer, exact_or_ball, interval_text
 from ptcc_certify.checker import MANY_COMPONENTS
 from ptcc_certify.checker.family import THEOREM
