@@ -41,7 +41,7 @@ from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.structure import analyse, weak_components
 from ptcc_certify.lyapunov.common_form_search import search_common_forms
 from ptcc_certify.lyapunov.common_forms import CommonForm, Quotient
-from ptcc_certify.lyapunov.interval_rows import IntervalRows, Policy, least_quotient
+from ptcc_certify.lyapunov.follower_rows import IntervalRows, Policy, least_quotient
 from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
 from ptcc_certify.theorems.kernel import UNKNOWN, Kernel, TooLarge, reached
 

@@ -21,7 +21,7 @@ from ptcc_certify.lyapunov.follower_function import (
     least_rate,
     prove_follower_decay,
 )
-from ptcc_certify.lyapunov.interval_rows import IntervalRows
+from ptcc_certify.lyapunov.follower_rows import IntervalRows
 from ptcc_certify.theorems.family_behaviour import decide
 
 KINDS = ("stability", "bipartite consensus", "bipartite containment")

@@ -37,7 +37,7 @@ from ptcc_certify.checker.constrained_switching import reachable_bounds
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.lyapunov.follower_function import FollowerDecay, follower_decays, least_rate
-from ptcc_certify.lyapunov.interval_rows import IntervalRows, least_quotient
+from ptcc_certify.lyapunov.follower_rows import IntervalRows, least_quotient
 
 _ROUNDS = 60
 #: Binary places of the ends, against the largest of them.

@@ -33,7 +33,7 @@ from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import analyse, find_camps
 from ptcc_certify.lyapunov.common_forms import MARGIN, CommonForm, mean_constant, rounded_up, weighted_mean
-from ptcc_certify.lyapunov.interval_rows import IntervalRows, Policy
+from ptcc_certify.lyapunov.follower_rows import IntervalRows, Policy
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
 from ptcc_certify.theorems.kernel import reached
 from ptcc_certify.theorems.lemmas import exact_left_vector, solve_exact
