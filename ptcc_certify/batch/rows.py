@@ -58,7 +58,7 @@ from threadpoolctl import threadpool_limits
 
 import ptcc_certify
 from lmi.exact.decimal_rounding import float_down, float_up
-from ptcc_certify.batch.settings import Settings, StateLike
+from ptcc_certify.batch.sources import Settings, StateLike
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.errors import PTCCError, explain, one_line
