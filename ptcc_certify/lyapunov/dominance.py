@@ -26,10 +26,9 @@ from typing import Any
 import numpy as np
 
 import lmi
-from lmi.definiteness_proofs import prove_generalized_margin
+from lmi.definiteness_proofs import SparseDefinitenessProof, prove_generalized_margin, prove_sparse_positive_definite
 from lmi.dyadic import round_array, round_to_bits
 from lmi.errors import LMIError, NoCertificate
-from lmi.sparse_definiteness_proofs import SparseDefinitenessProof, prove_sparse_positive_definite
 from lmi.sparse_h_matrix import FILL_ROWS, SparseHMatrix, fill_core
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.size_limits import EXACT_NODES

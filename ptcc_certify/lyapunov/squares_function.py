@@ -26,12 +26,12 @@ from typing import Any
 
 import numpy as np
 
+from lmi.definiteness_proofs import prove_sparse_positive_definite
 from lmi.dyadic import dyadic_array, round_array, round_to_bits
 from lmi.exact import arithmetic
 from lmi.exact.decimal_rounding import down
 from lmi.exact.definite import SparseFactor
 from lmi.search_time import checkpoint
-from lmi.sparse_definiteness_proofs import prove_sparse_positive_definite
 from lmi.sparse_h_matrix import FILL_ROWS, fill_core, solve
 from ptcc_certify.checker.family import Edge
 from ptcc_certify.checker.weighted_squares import WeightedSquares
