@@ -24,7 +24,7 @@ from ptcc_certify.simulation.instants import Instants
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
-    from ptcc_certify.simulation.switched_motion import Course
+    from ptcc_certify.simulation.switching_signals import Course
 
 MAX_JUMPS = 10**4
 # From 1 - t/T = e^-40 on, what a disturbance still moves is beyond a float's last digit; noise times a gain that grows

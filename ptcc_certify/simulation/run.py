@@ -38,8 +38,7 @@ from ptcc_certify.simulation.member_laplacians import Choice, Members
 from ptcc_certify.simulation.moving_leaders import simulate_tracking
 from ptcc_certify.simulation.nominal import Bounded, as_forcing, sample, sample_and_hold
 from ptcc_certify.simulation.sliding import SlidingMotion, rounding_slack
-from ptcc_certify.simulation.switched_motion import Course
-from ptcc_certify.simulation.switching_signals import ConstantSignal, Signal, as_signal
+from ptcc_certify.simulation.switching_signals import ConstantSignal, Course, Signal, as_signal
 from ptcc_certify.simulation.trajectory import RESOLVED, Conditions, Played, Setup, Trajectory
 
 

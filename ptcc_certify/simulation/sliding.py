@@ -24,7 +24,7 @@ from ptcc_certify.model.reaching_time import LAST_Z, ReachingProblem, worst_case
 from ptcc_certify.simulation.cvodes import Drive, Motion, Phase, Tolerances
 from ptcc_certify.simulation.instants import Instants, tau_before
 from ptcc_certify.simulation.member_laplacians import Choice, Members
-from ptcc_certify.simulation.switched_motion import Course, Leg
+from ptcc_certify.simulation.switching_signals import Course, Leg
 from ptcc_certify.simulation.trajectory import Sliding
 
 if TYPE_CHECKING:

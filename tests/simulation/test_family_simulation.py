@@ -202,7 +202,7 @@ def test_bad_tables_are_refused_by_line():
 
 
 def test_a_signal_that_switches_too_often_is_refused_in_time(monkeypatch):
-    monkeypatch.setattr("ptcc_certify.simulation.switched_motion.MOST_STRETCHES", 50)
+    monkeypatch.setattr("ptcc_certify.simulation.switching_signals.MOST_STRETCHES", 50)
     with pytest.raises(SimulationError, match="let each member act longer"):
         simulate(PAIR, PROTOCOL, [1, 2, 3], RandomSignal(dwell=1e-3))
 
