@@ -73,8 +73,134 @@ class RejectedCertificate(PTCCError, ValueError):
         super().__init__(f"{shorten(str(path), 200)}: {reason}; {mend}")
 
 
-class Recorded(Evidence):
-    """A certificate as it is recorded: JSON and file, check and verdict, what is told."""
+def write_certificate(path: str | Path, document: Mapping[str, Any], files: Mapping[str, bytes]) -> None:
+    """Write a certificate, its side files first; each file appears whole or not at all.
+
+    Raises
+    ------
+    ParameterError
+        The path ends neither in ``.json`` nor in nothing.
+    FormatError
+        A file cannot be written.
+    """
+    refuse_no_path(path)
+    path = Path(path)
+    if path.suffix.lower() not in ("", ".json"):
+        other = ", a page or LaTeX by write_report, a figure by save_figure"
+        raise ParameterError(f"{shorten(str(path), 200)}: a certificate is saved as .json{other}")
+    for name, content in files.items():
+        write_atomically(path.parent / name, content)
+    write_atomically(path, bytes_of(document))
+
+
+def text_of(document: Mapping[str, Any]) -> str:
+    """Return JSON as it stands in a file, without NaN or infinity."""
+    return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def bytes_of(document: Mapping[str, Any]) -> bytes:
+    """Return the file: what UTF-8 cannot hold, a lone surrogate in a label, becomes its JSON escape."""
+    return text_of(document).encode("utf-8", "backslashreplace")
+
+
+def _of_graph(proof: GraphProof) -> dict[str, Any]:
+    """Return where agents begin and end, and how near they are proved to be, NaN where that is not known."""
+    unknown = np.full(proof.graph.n_nodes, np.nan)
+    begin, end = proof.initial_positions, proof.final_positions
+    deviation = unknown
+    if begin is not None and proof.functions:
+        share = 1 if proof.direct else float(proof.protocol.span / proof.protocol.T)
+        deviation = proof.deviation_bound([0.01 * share])[:, 0]
+    return {
+        "x(0)": unknown if begin is None else [float(x) for x in begin],
+        "x(T)": unknown if end is None else np.asarray(end, dtype=float),
+        "deviation": np.where(np.isfinite(deviation), deviation, np.nan),
+    }
+
+
+def _of_family(proof: FamilyProof, certified: bool) -> dict[str, Any]:
+    """Return intervals; nothing of restricted signals, nor of boxes, unless the check accepts the certificate."""
+    unknown: list[Interval | None] = [None] * proof.family.n_nodes
+    restricted = ends_for_signal(proof) if certified else unknown
+    signal = "" if proof.signal == "any" else str(proof.signal)
+    return {
+        **_pair("least", "largest", proof.final_positions or unknown),
+        **_pair("restricted_least", "restricted_largest", restricted),
+        "restricted_to": ["" if ends is None else signal for ends in restricted],
+        **_pair("box_least", "box_largest", _boxes(proof) if certified else unknown),
+        **_pair("stays_least", "stays_largest", _ranges(proof) if certified else unknown),
+        "keeps": _keeps(proof),
+    }
+
+
+def _pair(least: str, largest: str, states: Iterable[Interval | None]) -> dict[str, np.ndarray]:
+    """Return two columns of ends rounded outwards, NaN where there are none."""
+    unknown = (math.nan, math.nan)
+    ends = [unknown if one is None else (float_down(one[0]), float_up(one[1])) for one in states]
+    low, high = np.array(ends, dtype=float).T
+    return {least: low, largest: high}
+
+
+def _boxes(proof: FamilyProof) -> list[Interval | None]:
+    """Return the interval of the box of every agent that is in one."""
+    result: list[Interval | None] = [None] * proof.family.n_nodes
+    for number, box in proof.boxes.items():
+        nodes = proof.parts[number].component.nodes[box.decay.nodes].tolist()
+        for v, low, high in zip(nodes, box.lower, box.upper, strict=True):
+            result[v] = low, high
+    return proof.in_places(result)
+
+
+def _ranges(proof: FamilyProof) -> list[Interval | None]:
+    """Return the interval in which every signal keeps an agent whose end depends on it."""
+    result: list[Interval | None] = [None] * proof.family.n_nodes
+    for number, ends in proof.ranges.items():
+        for v, own in zip(proof.parts[number].component.nodes.tolist(), ends, strict=True):
+            result[v] = own
+    return proof.in_places(result)
+
+
+def _keeps(proof: FamilyProof) -> np.ndarray:
+    """Tell which agents no edge of any mode leads to, while no sliding variable moves, nor leaders."""
+    _, target, _ = proof.family.union
+    hears = np.zeros(proof.family.n_nodes, dtype=bool)
+    hears[target] = True
+    return ~hears & (proof.direct and not proof.leaders_move)
+
+
+@gated
+class Certificate(Evidence):
+    """A claim about a signed digraph, or a family of these, under a protocol, with its proof.
+
+    Made by :func:`ptcc_certify.certify`, or read from a file by :func:`read_certificate`. What its parts tell is asked
+    of it by the same names: ``cert.rate`` is ``cert.proof.rate``, ``cert.limits`` is ``cert.question.request.limits``.
+    In a formation ``cert.final_state`` is of positions, and ``cert.proof.final_state`` less the places.
+
+    Attributes
+    ----------
+    proof : GraphProof or FamilyProof
+        What is proved, with the question that it answers: :mod:`ptcc_certify.certificate.graph_proof` of one graph,
+        :mod:`ptcc_certify.certificate.family_proof` of a family whatever the signal.
+    observed : Observations
+        What was seen, and is not claimed.
+
+    References
+    ----------
+    Theorems 1 to 6 and Corollaries 1 to 10 of [Zhu]_; docs/theory/families.md.
+
+    Examples
+    --------
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], asks=Asks(simulation=False))
+    >>> cert.verdict, cert.claim.behaviour, cert.claim.theorem
+    ('certified', 'bipartite consensus', '1.1')
+    >>> cert.final_state, bool(cert.rate <= cert.upper_bound), cert.checked.accepted
+    (FinalState(1=1, 2=-1), True, True)
+    >>> day = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)])
+    >>> night = SignedDigraph.from_edges([("c", "a", -2), ("a", "b", 1)])
+    >>> certify({"day": day, "night": night}, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2, 3])
+    Certificate(bipartite consensus for every signal, rate 0.955184, certified)
+    """
 
     @property
     def source(self) -> Source | None:
@@ -267,156 +393,7 @@ class Recorded(Evidence):
     def _digest(self) -> str:
         return str(self._recorded[0]["digest"])
 
-
-def write_certificate(path: str | Path, document: Mapping[str, Any], files: Mapping[str, bytes]) -> None:
-    """Write a certificate, its side files first; each file appears whole or not at all.
-
-    Raises
-    ------
-    ParameterError
-        The path ends neither in ``.json`` nor in nothing.
-    FormatError
-        A file cannot be written.
-    """
-    refuse_no_path(path)
-    path = Path(path)
-    if path.suffix.lower() not in ("", ".json"):
-        other = ", a page or LaTeX by write_report, a figure by save_figure"
-        raise ParameterError(f"{shorten(str(path), 200)}: a certificate is saved as .json{other}")
-    for name, content in files.items():
-        write_atomically(path.parent / name, content)
-    write_atomically(path, bytes_of(document))
-
-
-def text_of(document: Mapping[str, Any]) -> str:
-    """Return JSON as it stands in a file, without NaN or infinity."""
-    return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-def bytes_of(document: Mapping[str, Any]) -> bytes:
-    """Return the file: what UTF-8 cannot hold, a lone surrogate in a label, becomes its JSON escape."""
-    return text_of(document).encode("utf-8", "backslashreplace")
-
-
-def agents_table(certificate: Recorded) -> pd.DataFrame:
-    """Return one row per agent; see :meth:`Certificate.to_pandas`.
-
-    Examples
-    --------
-    >>> moved = Family.from_intervals([("a", "c", 1, 3), ("b", "c", 1, 1)])
-    >>> cert = certify(moved, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), {"a": 0, "b": 4, "c": 9})
-    >>> agents_table(cert)[["box_least", "box_largest"]].loc["c"].tolist()
-    [1.0, 2.0]
-    """
-    pandas = import_pandas()
-    columns: Mapping[Any, Any]
-    proof = certificate.proof
-    if isinstance(proof, FamilyProof):
-        columns = _of_family(proof, certificate.verdict == "certified")
-    else:
-        own = _of_graph(proof) if proof.agents is None else proof.agents.columns()
-        columns = {**proof.structure.to_pandas(), **own}
-    return pandas.DataFrame(columns, index=pandas.Index(proof.labels, name="node"))
-
-
-def _of_graph(proof: GraphProof) -> dict[str, Any]:
-    """Return where agents begin and end, and how near they are proved to be, NaN where that is not known."""
-    unknown = np.full(proof.graph.n_nodes, np.nan)
-    begin, end = proof.initial_positions, proof.final_positions
-    deviation = unknown
-    if begin is not None and proof.functions:
-        share = 1 if proof.direct else float(proof.protocol.span / proof.protocol.T)
-        deviation = proof.deviation_bound([0.01 * share])[:, 0]
-    return {
-        "x(0)": unknown if begin is None else [float(x) for x in begin],
-        "x(T)": unknown if end is None else np.asarray(end, dtype=float),
-        "deviation": np.where(np.isfinite(deviation), deviation, np.nan),
-    }
-
-
-def _of_family(proof: FamilyProof, certified: bool) -> dict[str, Any]:
-    """Return intervals; nothing of restricted signals, nor of boxes, unless the check accepts the certificate."""
-    unknown: list[Interval | None] = [None] * proof.family.n_nodes
-    restricted = ends_for_signal(proof) if certified else unknown
-    signal = "" if proof.signal == "any" else str(proof.signal)
-    return {
-        **_pair("least", "largest", proof.final_positions or unknown),
-        **_pair("restricted_least", "restricted_largest", restricted),
-        "restricted_to": ["" if ends is None else signal for ends in restricted],
-        **_pair("box_least", "box_largest", _boxes(proof) if certified else unknown),
-        **_pair("stays_least", "stays_largest", _ranges(proof) if certified else unknown),
-        "keeps": _keeps(proof),
-    }
-
-
-def _pair(least: str, largest: str, states: Iterable[Interval | None]) -> dict[str, np.ndarray]:
-    """Return two columns of ends rounded outwards, NaN where there are none."""
-    unknown = (math.nan, math.nan)
-    ends = [unknown if one is None else (float_down(one[0]), float_up(one[1])) for one in states]
-    low, high = np.array(ends, dtype=float).T
-    return {least: low, largest: high}
-
-
-def _boxes(proof: FamilyProof) -> list[Interval | None]:
-    """Return the interval of the box of every agent that is in one."""
-    result: list[Interval | None] = [None] * proof.family.n_nodes
-    for number, box in proof.boxes.items():
-        nodes = proof.parts[number].component.nodes[box.decay.nodes].tolist()
-        for v, low, high in zip(nodes, box.lower, box.upper, strict=True):
-            result[v] = low, high
-    return proof.in_places(result)
-
-
-def _ranges(proof: FamilyProof) -> list[Interval | None]:
-    """Return the interval in which every signal keeps an agent whose end depends on it."""
-    result: list[Interval | None] = [None] * proof.family.n_nodes
-    for number, ends in proof.ranges.items():
-        for v, own in zip(proof.parts[number].component.nodes.tolist(), ends, strict=True):
-            result[v] = own
-    return proof.in_places(result)
-
-
-def _keeps(proof: FamilyProof) -> np.ndarray:
-    """Tell which agents no edge of any mode leads to, while no sliding variable moves, nor leaders."""
-    _, target, _ = proof.family.union
-    hears = np.zeros(proof.family.n_nodes, dtype=bool)
-    hears[target] = True
-    return ~hears & (proof.direct and not proof.leaders_move)
-
-
-@gated
-class Certificate(Recorded):
-    """A claim about a signed digraph, or a family of these, under a protocol, with its proof.
-
-    Made by :func:`ptcc_certify.certify`, or read from a file by :func:`read_certificate`. What its parts tell is asked
-    of it by the same names: ``cert.rate`` is ``cert.proof.rate``, ``cert.limits`` is ``cert.question.request.limits``.
-    In a formation ``cert.final_state`` is of positions, and ``cert.proof.final_state`` less the places.
-
-    Attributes
-    ----------
-    proof : GraphProof or FamilyProof
-        What is proved, with the question that it answers: :mod:`ptcc_certify.certificate.graph_proof` of one graph,
-        :mod:`ptcc_certify.certificate.family_proof` of a family whatever the signal.
-    observed : Observations
-        What was seen, and is not claimed.
-
-    References
-    ----------
-    Theorems 1 to 6 and Corollaries 1 to 10 of [Zhu]_; docs/theory/families.md.
-
-    Examples
-    --------
-    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
-    >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], asks=Asks(simulation=False))
-    >>> cert.verdict, cert.claim.behaviour, cert.claim.theorem
-    ('certified', 'bipartite consensus', '1.1')
-    >>> cert.final_state, bool(cert.rate <= cert.upper_bound), cert.checked.accepted
-    (FinalState(1=1, 2=-1), True, True)
-    >>> day = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)])
-    >>> night = SignedDigraph.from_edges([("c", "a", -2), ("a", "b", 1)])
-    >>> certify({"day": day, "night": night}, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2, 3])
-    Certificate(bipartite consensus for every signal, rate 0.955184, certified)
-    """
+    # ------------------------------------------------------------------ of families, and tables
 
     @property
     def refused(self) -> bool:
@@ -466,8 +443,20 @@ class Certificate(Recorded):
         >>> table = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2]).to_pandas()
         >>> table.loc["b", ["least", "largest"]].tolist(), table["keeps"].tolist()
         ([-1.0, -1.0], [True, False])
+        >>> moved = Family.from_intervals([("a", "c", 1, 3), ("b", "c", 1, 1)])
+        >>> cert = certify(moved, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), {"a": 0, "b": 4, "c": 9})
+        >>> cert.to_pandas()[["box_least", "box_largest"]].loc["c"].tolist()
+        [1.0, 2.0]
         """
-        return agents_table(self)
+        pandas = import_pandas()
+        columns: Mapping[Any, Any]
+        proof = self.proof
+        if isinstance(proof, FamilyProof):
+            columns = _of_family(proof, self.verdict == "certified")
+        else:
+            own = _of_graph(proof) if proof.agents is None else proof.agents.columns()
+            columns = {**proof.structure.to_pandas(), **own}
+        return pandas.DataFrame(columns, index=pandas.Index(proof.labels, name="node"))
 
     def __repr__(self) -> str:
         rate = "none" if self.proof.rate is None else down(self.proof.rate)
