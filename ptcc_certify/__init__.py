@@ -70,7 +70,7 @@ _EXPORTS = {
     "SampledDisturbance": "model.disturbance",
     "StateDependent": "model.disturbance",
     "telegraph_noise": "model.disturbance",
-    "GainLimits": "model.gain_limits",
+    "GainLimits": "model.asks",
     "LateMessages": "model.late_messages",
     "MovingLeaders": "model.late_messages",
     # Runs

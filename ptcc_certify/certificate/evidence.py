@@ -21,8 +21,8 @@ from ptcc_certify.certificate.request import OfQuestion, Question
 from ptcc_certify.errors import ParameterError, PTCCError, SimulationError, did_you_mean, unknown_parameter
 from ptcc_certify.lazy_report import Shown
 from ptcc_certify.lyapunov.search import Search
+from ptcc_certify.model.asks import GainLimits
 from ptcc_certify.model.disturbance import ExpressionDisturbance
-from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.simulation.late_messages import can_run, simulate_late
 from ptcc_certify.simulation.moving_leaders import simulate_tracking

@@ -26,9 +26,8 @@ from ptcc_certify.graphs.rationals import as_fraction, shorten, writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.model import Protocol
-from ptcc_certify.model.asks import Case, Expectations, InitialState
+from ptcc_certify.model.asks import Case, Expectations, GainLimits, InitialState
 from ptcc_certify.model.constrained_switching import SignalClass, read_signal
-from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 from ptcc_certify.model.parameters import parameter
 from ptcc_certify.model.reaching_time import ReachingTime, certified_reaching_times

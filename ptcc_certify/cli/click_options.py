@@ -19,9 +19,8 @@ from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import OPTIONAL, UNCERTAINTY, Reading
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.agents import Agents
-from ptcc_certify.model.asks import Asks, Expectations, InitialState, Run
+from ptcc_certify.model.asks import Asks, Expectations, GainLimits, InitialState, Run
 from ptcc_certify.model.constrained_switching import CLOCK_DWELL, ClockShares, DwellTime, JointWindows
-from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 
 Decorator = Callable[[Any], Any]

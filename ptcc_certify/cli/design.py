@@ -19,8 +19,7 @@ from ptcc_certify.errors import ExitCode, ParameterError, one_line
 from ptcc_certify.gain_design.request import DesignRequest
 from ptcc_certify.graphs.rationals import short_exact
 from ptcc_certify.model import SlidingModeProtocol
-from ptcc_certify.model.asks import Asks, Expectations, InitialState, Run
-from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.asks import Asks, Expectations, GainLimits, InitialState, Run
 from ptcc_certify.report.text_layout import wrap_command
 
 if TYPE_CHECKING:

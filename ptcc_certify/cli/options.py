@@ -23,8 +23,7 @@ from ptcc_certify.graphs.declared_option import options_of
 from ptcc_certify.graphs.reading import Reading, option_flags
 from ptcc_certify.graphs.recognised_files import TOML, kind_of, refuse_as_certificate, refuse_as_graph, shell_word
 from ptcc_certify.model import NominalProtocol, Protocol, SlidingModeProtocol
-from ptcc_certify.model.asks import Asks, Expectations, InitialState, Run
-from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.asks import Asks, Expectations, GainLimits, InitialState, Run
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate

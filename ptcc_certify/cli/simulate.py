@@ -22,8 +22,7 @@ from ptcc_certify.errors import ExitCode, ParameterError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.recognised_files import kind_of
 from ptcc_certify.lazy_report import rendered
-from ptcc_certify.model.asks import Asks, Case, InitialState, Run
-from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.asks import Asks, Case, GainLimits, InitialState, Run
 from ptcc_certify.model.late_messages import MovingLeaders
 from ptcc_certify.model.refusals import refuse_in_places
 

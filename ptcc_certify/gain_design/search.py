@@ -58,8 +58,7 @@ from ptcc_certify.graphs.digraph import Exact
 from ptcc_certify.graphs.rationals import nearest_float, shorten
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.model import NominalProtocol
-from ptcc_certify.model.asks import Asks, Expectations
-from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.asks import Asks, Expectations, GainLimits
 from ptcc_certify.model.parameters import parameter
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
 

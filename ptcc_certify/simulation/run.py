@@ -25,9 +25,9 @@ from ptcc_certify.graphs.io import as_family, as_graph, as_states
 from ptcc_certify.graphs.io.conversion import is_family
 from ptcc_certify.graphs.rationals import number_within, shorten
 from ptcc_certify.model import Protocol
+from ptcc_certify.model.asks import GainLimits
 from ptcc_certify.model.base import refuse_no_protocol
 from ptcc_certify.model.disturbance import StateDependent, as_disturbance
-from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.late_messages import LateMessages, MovingLeaders, told_leaders
 from ptcc_certify.model.refusals import refuse_together
 from ptcc_certify.simulation.cvodes import Motion, Tolerances
@@ -105,7 +105,7 @@ def simulate(
     The nominal protocol gives ``X' = -gain(t) L X``. The sliding-mode protocol under a disturbance gives the Filippov
     solution: every sliding variable reaches 0 at a root of its own equation and stays there.
 
-    The nominal protocol may act under :class:`~ptcc_certify.model.gain_limits.GainLimits`, and under a disturbance
+    The nominal protocol may act under :class:`~ptcc_certify.model.asks.GainLimits`, and under a disturbance
     and measurement noise: ``X' = -gain(t) L (X + n) + d``, the gain being the one that acts.
 
     Parameters

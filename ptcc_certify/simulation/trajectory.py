@@ -17,7 +17,7 @@ from ptcc_certify.graphs.labels import import_pandas, position
 from ptcc_certify.graphs.packed_weights import ByValue
 from ptcc_certify.graphs.rationals import number_within, shorten
 from ptcc_certify.lazy_report import Shown, rendered
-from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.asks import GainLimits
 from ptcc_certify.simulation.instants import Instants
 from ptcc_certify.simulation.member_laplacians import Choice, Members
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.asks import GainLimits
 from ptcc_certify.simulation.agents import MOST_STATES, AgentsMotion, AgentsTrajectory, instants_left
 from ptcc_certify.simulation.instants import Instants
 from ptcc_certify.simulation.late_messages import simulate_late

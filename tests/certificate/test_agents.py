@@ -24,8 +24,7 @@ from ptcc_certify.errors import Change, ParameterError, spell
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.agents import Agents
-from ptcc_certify.model.asks import Asks, Expectations, InitialState
-from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.asks import Asks, Expectations, GainLimits, InitialState
 from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 from ptcc_certify.report.screen import summary_lines
 

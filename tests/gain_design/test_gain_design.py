@@ -25,7 +25,7 @@ from ptcc_certify.gain_design.search import Option, _at, design, least_peak, pea
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import read_graph
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.asks import GainLimits
 from ptcc_certify.simulation.run import simulate
 
 PAIR = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])

@@ -13,7 +13,7 @@ from ptcc_certify.errors import FormatError, ParameterError, SimulationError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.model import NominalProtocol
-from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.asks import GainLimits
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.simulation.member_laplacians import Members
 from ptcc_certify.simulation.run import simulate

@@ -28,8 +28,8 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.follower_rows import leading_group, listeners
+from ptcc_certify.model.asks import GainLimits
 from ptcc_certify.model.base import Protocol
-from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 from ptcc_certify.model.limited_gain import LimitedGain
 
