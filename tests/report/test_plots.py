@@ -41,9 +41,8 @@ from ptcc_certify.graphs.packed_weights import Weights
 from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.model.asks import Asks, GainLimits, InitialState
-from ptcc_certify.model.base import NominalProtocol
+from ptcc_certify.model.base import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
-from ptcc_certify.model.sliding_mode import SlidingModeProtocol
 from ptcc_certify.report.notebook import trajectory_html
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.camp_lines import (
