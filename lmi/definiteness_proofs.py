@@ -2,6 +2,10 @@
 
 Nothing here trusts a float: what floats suggest is rounded to integers and handed to :mod:`lmi.exact`, which decides
 without a solver. Matrices are exact: a float is the dyadic number that it is.
+
+Proofs for sparse matrices: rounded sparse factors.
+
+Floats propose the witness, the kernel decides (:mod:`lmi.exact`).
 """
 
 from __future__ import annotations

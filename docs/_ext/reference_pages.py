@@ -16,7 +16,7 @@ ROOMS = {
     "graphs": ("Graphs and their structure", "graphs.digraph graphs.io graphs.structure graphs.ensembles"),
     "model": (
         "What is asked of what: protocols, agents, messages, disturbances",
-        "model model.gain model.gain_limits model.disturbance model.reaching_time model.case model.asks model.asks",
+        "model model.gain model.disturbance model.reaching_time model.asks",
     ),
     "certificate": (
         "Certificates",
@@ -31,7 +31,7 @@ ROOMS = {
     "simulation": ("Simulation", "simulation.trajectory"),
     "theorems": (
         "Theorems and lemmas",
-        "theorems.claims theorems.table theorems.theorem theorems.lemmas theorems.casadi_lyapunov",
+        "theorems.table theorems.theorem theorems.lemmas theorems.casadi_lyapunov",
     ),
     "gain_design": (
         "Design of gains and deadlines",

@@ -1,4 +1,4 @@
-"""What paths, patterns and ensembles stand for: sources, one for each graph, and what a worker is sent of them."""
+"""What a batch is of: settings that all rows depend on, and sources, one for each graph, with what a worker is sent."""
 
 from __future__ import annotations
 

@@ -5,6 +5,16 @@ With ``push`` what drives it per unit of the clock ``s``, which is 0 but in a re
     y(t) = e^(-rate s(t)/2) first + int_0^t e^(-rate (s(t) - s(r))/2) push(r) ds(r)
 
 bounds ``sqrt(V)``: then norms, deviations and speeds of agents are at most constants times ``y``.
+
+The time in which sliding variables move: its instants in floats, and what drives a norm that decays otherwise.
+
+With ``psi = e^(-mu2 t) ((T_r - t)/T_r)^(mu3 kappa)``, which bounds ``|sigma_k| / |sigma_k(0)|``, and a rate
+``2 alpha``,
+
+    v(t)  <=  e^(-alpha s(t)) v(0) + int_0^min(t,T_r) e^(-alpha (s(t) - s(r))) gain(r) push(r) dr
+
+where ``push`` is ``c psi`` for families, and a norm of bounds of all ``|sigma_k|`` for one graph. It decreases, so that
+its value at the begin of a piece is the largest.
 """
 
 from __future__ import annotations

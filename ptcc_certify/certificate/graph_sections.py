@@ -1,4 +1,4 @@
-"""Graph, structure and claim in a certificate's file, and in what ``ptcc classify`` prints."""
+"""Graph, structure, claim and final states in a certificate's file, and what ``ptcc classify`` prints of them."""
 
 from __future__ import annotations
 

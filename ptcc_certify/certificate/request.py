@@ -1,4 +1,4 @@
-"""What is asked of :func:`ptcc_certify.certify`, read and refused where it does not fit."""
+"""What is asked of :func:`ptcc_certify.certify`, refused where it does not fit; what proofs that answer it share."""
 
 from __future__ import annotations
 

@@ -14,6 +14,17 @@ The search is bisection with secants in the logarithms of deadline and bound. Ev
 :func:`~ptcc_certify.certificate.agents_part.prove_agents`, and compared with the limit exactly; it ends where a
 deadline keeps the limit and one that is shorter by a thousandth does not. The bound need not be monotone in the
 deadline: agents may fly towards each other.
+
+How long agents of order n need at least, whoever steers them, if their input is within a limit.
+
+Let ``x^(n) = u`` with ``|u| <= U``, and let ``D_i`` be the i-th derivative of its deviation from a free motion at the
+beginning, which is 0 at ``T`` with all its derivatives up to ``n - 1``. Integration by parts against the Chebyshev
+polynomial ``U_j`` of the second kind, shifted to ``[0, T]``, whose absolute value has the integral ``T``, gives
+
+    | sum_{q < n} 4^q q! C(j + q + 1, 2 q + 1) D_(n-1-q) T^(-q) | <= U T,      j = 0, .., n - 1.
+
+With ``n = 1`` this is ``|D| <= U T``; with ``n = 2`` it is ``|D_1| <= U T`` and ``|2 D_1 + 4 D_0/T| <= U T``. In space
+it holds of Euclidean norms.
 """
 
 from __future__ import annotations

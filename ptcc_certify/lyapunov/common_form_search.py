@@ -4,9 +4,29 @@ A search proposes a matrix ``P`` and multipliers in floats; they are rounded to 
 each mode is lowered until the kernel accepts one definite integer matrix of size n + q for it. Nothing enumerates the
 ``2^q`` vertices of a box.
 
+Families whose members share a positive left null vector: the distance to the states at rest, in closed form.
+
+Let ``p > 0`` and ``p' M(L) = 0`` for every member, ``M(L)`` with ``-|w|`` off the diagonal: known weights that share
+``p``, and uncertain undirected edges between nodes of equal ``p`` (``p = 1`` for undirected graphs). Then
+
+    x'(diag(p) L + L' diag(p)) x = sum_kl p_k |w_kl| (x_k - sgn(w_kl) x_l)^2
+
+grows with every weight: ``w-`` is the worst case, whatever the signal. The weighted distance to ``K`` decays at the
+rate ``b`` if ``S - b P > 0`` over the nodes that are no pivots, ``S`` the matrix above at ``w-`` and
+``P = diag(p) - diag(p) B (B' diag(p) B)^-1 B' diag(p)``: ``B' diag(p) X`` is constant. Where ``diag(p) L(w-)`` is
+symmetric in the slowest mode, no rate of any kind is larger.
+
+Forms for one initial state and a few instants: what is proved of deviations and inputs there is made small.
+
+A form of rate ``r`` bounds ``|y'xi|`` at the clock ``s`` by ``|y|_* sqrt(V(0)) e^(-r s / 2)``, ``|y|_*^2 = y'P^-1 y``.
+Among all forms of a rate that is a little below the largest, those of least ``V(0)`` are taken that have ``|y|_* <= 1``
+for the coordinates, and for the rows of inputs.
+
 References
 ----------
 docs/theory/families.md, "Common quadratic functions", "Uncertain weights" and "Undirected graphs".
+docs/theory/families.md, "Undirected graphs".
+docs/theory/families.md, "Common quadratic functions".
 """
 
 from __future__ import annotations

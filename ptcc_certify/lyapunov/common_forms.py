@@ -1,5 +1,15 @@
 """Lyapunov functions of families: one matrix for every signal, its rates, and the constants of inputs, all proved.
 
+The distance of a family of graphs to its common states at rest, as a linear system of its own.
+
+``K`` is at rest in every member, ``B`` its basis (N, d), and ``p_1 .. p_d`` are *pivots*, nodes whose rows of ``B`` are
+the unit vectors. Over the other nodes
+
+    xi_k = x_k - sum_j B_kj x_(p_j),    xi = C X,    xi' = -gain A xi,    A = C L C^r
+
+for every member ``L``, since ``L B = 0``; ``C^r`` puts ``xi`` on these nodes and 0 on the pivots. An uncertain weight
+changes ``A`` by a matrix of rank one: ``A = A_0 + sum_e delta_e f_e h_e'``, ``|delta_e| <= r_e``.
+
 References
 ----------
 docs/theory/families.md, "Common quadratic functions" and "Uncertain weights".

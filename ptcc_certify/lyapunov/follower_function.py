@@ -14,9 +14,24 @@ and ``gamma <= r_j / 2``, then ``W <= e^(-gamma s) W(0)`` for every signal: at t
 ``k`` hears is at most ``d_l W`` or ``e_l W``, and its target ``sum_p B_kp x_p`` moves at most that fast. One pass over
 the edges, in integers.
 
+The decay of followers of any size under every signal, proved row by row in integers.
+
+Let nobody outside ``F`` hear a node of ``F``. If ``d > 0`` and, for every node ``k`` of ``F``, in every mode,
+
+    sum_(l in F) |w_kl| (d_k - d_l) + sum_(l not in F) |w_kl| d_k  >=  alpha d_k
+
+at the worst weights, ``w+`` where ``d_l > d_k`` and ``w-`` elsewhere, then ``max_k |x_k| / d_k`` decays with
+``e^(-alpha s)`` along ``X_F' = -L_F X_F`` for every signal. With one mode, independent directed weights and camps that
+all edges in ``F`` keep, the largest ``alpha`` is the smallest eigenvalue of ``L_F`` over the box, and constant weights
+attain it: no certificate of any kind proves more.
+
+The search is policy iteration: solve ``(M - t I) d = 1``, take the worst weights for that ``d``, again until they
+stand. Whatever it proposes, integers decide.
+
 References
 ----------
 docs/theory/families.md, "Rows".
+docs/theory/families.md, "Rows". Howard, Dynamic Programming and Markov Processes, 1960.
 """
 
 from __future__ import annotations

@@ -8,6 +8,16 @@ has a solution with ``b > 0`` iff ``q`` is below 1 over the spectral radius of `
 I)^-1 1``, ``t`` just below the smallest eigenvalue of ``D - q |W_F|``. With ``q = 1`` it is the
 row-wise decay rate of followers. Where what is heard over an edge is younger than elsewhere, ``q`` has a smaller power.
 Where weights are uncertain, or a graph is one of several, the row of every follower is that of the worst member.
+
+Rows of a family with weights in intervals: the least pull of every row over all members, in integers, in one pass.
+
+In ``sum_l |w_kl| (y_k - y_l)`` every weight has a factor that does not depend on weights. The least value of a row over
+a mode is therefore taken at ``w+`` where ``y_l > y_k``, at ``w-`` elsewhere; over all members each row takes the mode
+that is worst for it. What rows prove needs no more: the decay of followers, final values, boxes that attract.
+
+References
+----------
+docs/theory/families.md, "Rows".
 """
 
 from __future__ import annotations

@@ -3,9 +3,12 @@
 In mode ``i`` the value ``xi' P_i xi`` decays at the rate ``r_i`` whatever the weights do in their intervals, and
 ``P_j <= ratio P_i`` bounds what a switch adds.
 
+A form whose mean rate over shares of the clock is large: some modes may be outages, or drive agents apart in it.
+
 References
 ----------
 docs/theory/families.md, "Dwell times".
+docs/theory/families.md, "Shares of the clock".
 """
 
 from __future__ import annotations

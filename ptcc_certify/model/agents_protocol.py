@@ -1,4 +1,4 @@
-"""The protocol that moves agents of order n by relative positions, velocities and so on."""
+"""The protocols of agents of order n: by relative positions, velocities and so on, and the cascade."""
 
 from __future__ import annotations
 

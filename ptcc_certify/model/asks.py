@@ -1,4 +1,4 @@
-"""What is asked of a certificate: how it is searched, for which initial states, and what is expected of it."""
+"""What is asked: of which graph and protocol, from which states, under which limits, how, and what is expected."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""What every protocol is asked: its gain, when its nominal phase begins and ends, its closed loop, its LaTeX.
+"""Protocols, nominal and sliding-mode, and what each is asked: gain, nominal phase, closed loop, LaTeX.
 
-A kind of protocol is a frozen dataclass of exact parameters in a module of its own; by its ``kind`` a file names it.
+A kind of protocol is a frozen dataclass of exact parameters; by its ``kind`` a file names it.
 """
 
 from __future__ import annotations

@@ -4,6 +4,14 @@
 
 ``0 <= tau_kl(t) <= age``. A value is sent every ``period``, of which at most ``losses`` in a row get lost; the last one
 that came is held, so that what is heard is at most ``delay + (losses + 1) period`` old.
+
+Leaders that move: how fast, what disturbs the followers, and the sign term that keeps them on their targets.
+
+x_j' = f(t, x_j) + v_j,  |v_j| <= speed                                  a leader, which listens to nobody
+x_k' = f(t, x_k) - gain(t) (L x)_k + d_k [ + sign_gain sign(e_k) ],      a follower, |d_k| <= disturbance,  e = -L x
+
+``f`` is what every agent does by itself: 0, or anything with ``|f(t, x) - f(t, y)| <= growth |x - y|`` that is odd in
+``x``, which nobody need know.
 """
 
 from __future__ import annotations

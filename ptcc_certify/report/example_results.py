@@ -1,4 +1,4 @@
-"""The paper's examples certified, and what came of each: a row for the screen, a row of CSV."""
+"""The paper's examples and published ones certified, and what came of each: a row for the screen, a row of CSV."""
 
 from __future__ import annotations
 

@@ -2,6 +2,11 @@
 
 A signal is piecewise constant on the stretched clock ``s``; a table may name instants of the time ``t`` instead, which
 the clock of the gain translates.
+
+A motion led by a signal along the stretched clock, from switch to switch; one graph is a constant signal.
+
+On the clock ``dX/ds = -L(s) X`` has no pole: before ``T`` a run is on it. The state at ``T`` is the limit for ``s`` to
+infinity, if there is one; from ``T`` on ``X' = -rho1 L X``.
 """
 
 from __future__ import annotations

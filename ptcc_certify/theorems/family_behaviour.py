@@ -12,6 +12,11 @@ linear time. Otherwise agents that follow several groups, or a group of which th
 are rational numbers.
 
 A *constant* signal is one member, which nobody knows: then each behaviour is decided on edges alone.
+
+Where agents end under signals that switch finitely often before the deadline: where the last mode leads them.
+
+The stretched clock is infinite after the last switch. So the last mode does what it does by itself, from the state in
+which the others left the agents (docs/theory/families.md, "The last mode").
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The lemmas of the paper as functions, one each; the theorems and the final state are built from them.
+"""The lemmas of the paper as functions, one each, and the arithmetic of matrices that theorems and final states need.
 
 Lemma 4 is :func:`lmi.h_matrix_lyapunov`, Lemma 5 :func:`lmi.schur_positive_definite` and Lemma 6
 :func:`ptcc_certify.model.gain.prescribed_time_bound`; the others are here. Lemma 7.1 is Lemma 9.1 for one closed

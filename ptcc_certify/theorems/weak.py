@@ -1,4 +1,4 @@
-"""Theorem 3: weakly connected signed digraphs with several closed components.
+"""Theorems 2 and 3: quasi-strongly, and weakly connected signed digraphs: one closed component, or several.
 
 The block-triangular argument needs no weak connectivity, so the same Lyapunov functions serve disconnected graphs.
 """

@@ -22,6 +22,13 @@ with ``R >= |r|``, ``S >= |X|``
 and no ``L`` is in ``r(0) = x'(0)/eta(0) + g(0) X(0)``. An agent whose deviations and errors have the constants ``c``
 and ``c^E`` deviates by at most ``sqrt(c) S``, and its velocity by the lesser of ``eta sqrt(c) (R + g S)`` and ``eta
 sqrt(c^E) J + e^(-alpha s) sqrt(c) |x'(0)|``. Both bounds of ``|X|`` hold; :func:`course` steps through the latter.
+
+Lyapunov functions of agents of order n where halves of the time are left, as the check encloses them.
+
+Of agents by one matrix they are of ``y``; of the cascade of positions and of ``r``, of which its bounds are made.
+
+What a function is worth there, of the motion from one initial state, is far less than its decay says: most of it is of
+motions that die sooner.
 """
 
 from __future__ import annotations

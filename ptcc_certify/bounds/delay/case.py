@@ -1,4 +1,14 @@
-"""What is asked of late messages and moving leaders: of whom, under which protocol, and what is known already."""
+"""What is asked of late messages and moving leaders: of whom, under which protocol, and what is known already.
+
+Followers that hear late of leaders in groups, which hear each other at once and settle by themselves.
+
+Leaders move as if nothing were late: ``|x_l - x_l*| <= sqrt(c_l V(0)) e^(-r s/2)`` by a Lyapunov function of rate
+``r``, ``V(0)`` with followers whose errors are 0. With ``u_l`` no less than that for leaders, ``0 < b <= r/2`` and
+
+    D_k u_k - sum_l q^(age_kl/age) |w_kl| u_l >= b u_k,  u_k >= |x_k(0) - x_k*|    for every follower k, over all l
+
+``|x_k(t) - x_k*| <= u_k e^(-b s_c(t))`` for all agents, ``s_c`` the integral of ``min(gain, ln q/(b age))``.
+"""
 
 from __future__ import annotations
 

@@ -5,6 +5,11 @@ final state yet. With signs ``g`` that fit the weights among all followers that 
 and ``g_l eps_l(0) >= 0``, deviations keep their signs and fall no faster than ``e^(-D_l s)``:
 
     |eps_k(T)| >= sum_l (|w_kl|/D_k) e^(-D_l s(T - tau_kl)) |eps_l(0)|.
+
+Deadlines of stages: where followers form no cycle, each agent is at its final state by a deadline of its own.
+
+The level of a follower is the longest path from leaders to it. With deadlines one delay apart, from level to level, all
+that an agent hears is final at its own deadline, where its gain has a pole: it is there exactly, and stays.
 """
 
 from __future__ import annotations

@@ -8,6 +8,14 @@ If numbers ``h_k`` satisfy for every node ``k`` of the closed set
 then ``c <= c+`` for all weights of the mode: multiply by ``eta_k(w) >= 0`` and add. Policy iteration, which solves for
 ``(c, h)`` and takes the worst weights, ends at the maximum, which is so attained. Weights that change may exceed it.
 
+Weighted means that every signal keeps: they tell exactly where a group of leaders ends.
+
+Let a component of a family have a common kernel with basis ``B``. The pivot of column ``j`` and all agents that it
+hears have rows ``g_k e_j'``: a *leading group* with camps ``g``, which ends at ``g c_j``. If ``p' M(L) = 0`` for every
+member, ``p`` supported on the group, then ``c_j = p' G X(0) / p' 1`` for every signal. Only the left null vector of the
+mandatory graph of the first mode can be such a ``p``: ones for undirected graphs. Where there is none, a Lyapunov
+function keeps ``p' G X`` near its first value, nearest for a ``p`` that is nearly one for all members.
+
 References
 ----------
 docs/theory/families.md, "Where it ends".

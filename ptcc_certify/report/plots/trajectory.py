@@ -1,4 +1,4 @@
-"""States and sliding variables over time."""
+"""States and sliding variables over time, agents of order n and their formations."""
 
 from __future__ import annotations
 
