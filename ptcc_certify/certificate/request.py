@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Iterable, Mapping, Sequence, Sized
 from dataclasses import dataclass, field
 from fractions import Fraction
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -308,85 +309,48 @@ class Source:
     files: Mapping[str, bytes] = field(repr=False)
 
 
+def _told(path: str) -> Any:
+    return property(attrgetter(path))
+
+
 class OfQuestion:
     """What a question tells, asked of what answers it."""
 
     question: Question
 
-    @property
-    def protocol(self) -> Protocol:
-        """The protocol."""
-        return self.question.protocol
-
-    @property
-    def initial_state(self) -> tuple[Fraction, ...] | None:
-        """``X(0)``."""
-        return self.question.initial_state
-
-    @property
-    def sigma0(self) -> tuple[Fraction, ...] | None:
-        """``sigma(0)`` of the sliding-mode protocol; None for the nominal one."""
-        return self.question.sigma0
-
-    @property
-    def labels(self) -> Sequence[str]:
-        """The names of the agents."""
-        return self.question.labels
-
-    @property
-    def request(self) -> Request:
-        """What was asked."""
-        return self.question.request
-
-    @property
-    def expectations(self) -> Expectations:
-        """What is asked besides."""
-        return self.request.expectations
-
-    @property
-    def origins(self) -> Mapping[str, str]:
-        """What the graph is called, and where initial states come from."""
-        return self.request.origins
-
-    @property
-    def method(self) -> str:
-        """Which Lyapunov functions were searched."""
-        return self.request.method
-
-    @property
-    def at(self) -> Fraction | None:
-        """Instant for which the bound was optimised, in units of time."""
-        return self.request.at
-
-    @property
-    def initial_set(self) -> InitialSet | None:
-        """The set of initial states for which the input is bounded; None: that of ``initial_state`` alone."""
-        return self.request.initial_set
+    #: The protocol.
+    protocol: Protocol = _told("question.protocol")
+    #: ``X(0)``.
+    initial_state: tuple[Fraction, ...] | None = _told("question.initial_state")
+    #: ``sigma(0)`` of the sliding-mode protocol; None for the nominal one.
+    sigma0: tuple[Fraction, ...] | None = _told("question.sigma0")
+    #: The names of the agents.
+    labels: Sequence[str] = _told("question.labels")
+    #: What was asked.
+    request: Request = _told("question.request")
+    #: What is asked besides.
+    expectations: Expectations = _told("question.request.expectations")
+    #: What the graph is called, and where initial states come from.
+    origins: Mapping[str, str] = _told("question.request.origins")
+    #: Which Lyapunov functions were searched.
+    method: str = _told("question.request.method")
+    #: Instant for which the bound was optimised, in units of time.
+    at: Fraction | None = _told("question.request.at")
+    #: The set of initial states for which the input is bounded; None: that of ``initial_state`` alone.
+    initial_set: InitialSet | None = _told("question.request.initial_set")
+    #: Limits of the gain that are judged besides.
+    limits: tuple[Limits, ...] = _told("question.request.limits")
+    #: Nominal protocol: bound of the disturbances that are judged besides, in units of the input.
+    delta: Fraction | None = _told("question.request.delta")
+    #: Nominal protocol: bound of the measurement noise that is judged under each of the limits.
+    noise: Fraction | None = _told("question.request.noise")
+    #: Seconds that the searches were given, infinity for no limit.
+    time_limit: float = _told("question.request.time_limit")
 
     @property
     def only_drawn(self) -> bool:
         """Whether the question is of a set of initial states, and the one at hand drawn for the simulated run."""
         return self.initial_set is not None and "x(0)" in self.request.origins
-
-    @property
-    def limits(self) -> tuple[Limits, ...]:
-        """Limits of the gain that are judged besides."""
-        return self.request.limits
-
-    @property
-    def delta(self) -> Fraction | None:
-        """Nominal protocol: bound of the disturbances that are judged besides, in units of the input."""
-        return self.request.delta
-
-    @property
-    def noise(self) -> Fraction | None:
-        """Nominal protocol: bound of the measurement noise that is judged under each of the limits."""
-        return self.request.noise
-
-    @property
-    def time_limit(self) -> float:
-        """Seconds that the searches were given, infinity for no limit."""
-        return self.request.time_limit
 
     @property
     def direct(self) -> bool:
