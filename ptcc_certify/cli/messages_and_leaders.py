@@ -27,11 +27,6 @@ def asks_for_messages(options: Options) -> bool:
     return any(options.get(name) is not None for name in _ASKING)
 
 
-def asks_for_leaders(options: Options) -> bool:
-    """Tell whether leaders move."""
-    return bool(given_of(MovingLeaders, options))
-
-
 def messages_of(graphs: Sequence[str], signed: SignedDigraph | Family, options: Options) -> LateMessages | None:
     """Return how late messages are; None if nothing is asked of them."""
     if options["packet_loss"] and options["period"] is None:
