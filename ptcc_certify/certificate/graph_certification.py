@@ -54,7 +54,7 @@ from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.base import ReachingProtocol
 from ptcc_certify.model.disturbance import as_disturbance
 from ptcc_certify.model.reaching_time import ReachingTime
-from ptcc_certify.simulation.instants import PAST
+from ptcc_certify.simulation.nominal import PAST
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.sliding import rounding_slack
 from ptcc_certify.simulation.trajectory import Trajectory

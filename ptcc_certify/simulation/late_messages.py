@@ -32,8 +32,8 @@ from ptcc_certify.model.late_messages import LateMessages, MovingLeaders, told_l
 from ptcc_certify.model.limited_gain import LimitedGain
 from ptcc_certify.model.refusals import refuse_together
 from ptcc_certify.simulation.cvodes import Tolerances
-from ptcc_certify.simulation.instants import MOST_STEPS, STEP_SHARE, Instants, steps_towards
 from ptcc_certify.simulation.moving_leaders import WorstLeaders
+from ptcc_certify.simulation.nominal import MOST_STEPS, STEP_SHARE, Instants, steps_towards
 from ptcc_certify.simulation.trajectory import Conditions, Setup, Trajectory
 
 Pattern = Literal["oldest", "fresh", "varying", "square"]

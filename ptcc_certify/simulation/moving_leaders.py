@@ -36,7 +36,7 @@ from ptcc_certify.model.base import Protocol, refuse_no_protocol
 from ptcc_certify.model.late_messages import MovingLeaders
 from ptcc_certify.model.refusals import refuse_leader_groups, refuse_together
 from ptcc_certify.simulation.cvodes import Tolerances
-from ptcc_certify.simulation.instants import MOST_STEPS, STEP_SHARE, Instants, steps_towards
+from ptcc_certify.simulation.nominal import MOST_STEPS, STEP_SHARE, Instants, steps_towards
 from ptcc_certify.simulation.trajectory import JUST_BEFORE, Conditions, Setup, Trajectory
 
 #: Steps up to T; how near they come; where a run ends.

@@ -31,12 +31,19 @@ from ptcc_certify.model.disturbance import StateDependent, as_disturbance
 from ptcc_certify.model.late_messages import LateMessages, MovingLeaders, told_leaders
 from ptcc_certify.model.refusals import refuse_together
 from ptcc_certify.simulation.cvodes import Motion, Tolerances
-from ptcc_certify.simulation.instants import PAST, default_instants, wanted_instants
 from ptcc_certify.simulation.interrupt import interruptible
 from ptcc_certify.simulation.late_messages import simulate_late
 from ptcc_certify.simulation.member_laplacians import Choice, Members
 from ptcc_certify.simulation.moving_leaders import simulate_tracking
-from ptcc_certify.simulation.nominal import Bounded, as_forcing, sample, sample_and_hold
+from ptcc_certify.simulation.nominal import (
+    PAST,
+    Bounded,
+    as_forcing,
+    default_instants,
+    sample,
+    sample_and_hold,
+    wanted_instants,
+)
 from ptcc_certify.simulation.sliding import SlidingMotion, rounding_slack
 from ptcc_certify.simulation.switching_signals import ConstantSignal, Course, Signal, as_signal
 from ptcc_certify.simulation.trajectory import RESOLVED, Conditions, Played, Setup, Trajectory

@@ -22,8 +22,8 @@ from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.model.disturbance import TOLERANCE, Disturbance, StateDependent, WorstCaseDisturbance
 from ptcc_certify.model.reaching_time import LAST_Z, ReachingProblem, worst_case
 from ptcc_certify.simulation.cvodes import Drive, Motion, Phase, Tolerances
-from ptcc_certify.simulation.instants import Instants, tau_before
 from ptcc_certify.simulation.member_laplacians import Choice, Members
+from ptcc_certify.simulation.nominal import Instants, tau_before
 from ptcc_certify.simulation.switching_signals import Course, Leg
 from ptcc_certify.simulation.trajectory import Sliding
 

@@ -18,8 +18,8 @@ from ptcc_certify.graphs.packed_weights import ByValue
 from ptcc_certify.graphs.rationals import number_within, shorten
 from ptcc_certify.lazy_report import Shown, rendered
 from ptcc_certify.model.asks import GainLimits
-from ptcc_certify.simulation.instants import Instants
 from ptcc_certify.simulation.member_laplacians import Choice, Members
+from ptcc_certify.simulation.nominal import Instants
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -18,9 +18,8 @@ import numpy as np
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.model.asks import GainLimits
 from ptcc_certify.simulation.agents import MOST_STATES, AgentsMotion, AgentsTrajectory, instants_left
-from ptcc_certify.simulation.instants import Instants
 from ptcc_certify.simulation.late_messages import simulate_late
-from ptcc_certify.simulation.nominal import sample
+from ptcc_certify.simulation.nominal import Instants, sample
 from ptcc_certify.simulation.run import simulate
 
 if TYPE_CHECKING:
