@@ -12,7 +12,7 @@ import numpy as np
 from ptcc_certify.bounds.agents.run_against_bounds import AgentsComparison
 from ptcc_certify.bounds.delay.late_messages import LateBounds
 from ptcc_certify.bounds.envelope import Comparison
-from ptcc_certify.bounds.final_state.labelled_ends import FinalEnds
+from ptcc_certify.bounds.final_state.enclosed_ends import FinalEnds
 from ptcc_certify.bounds.final_state.of_graph import FinalState, final_state
 from ptcc_certify.bounds.instants import remaining_part
 from ptcc_certify.certificate.family_proof import FamilyProof

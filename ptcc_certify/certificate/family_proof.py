@@ -19,7 +19,7 @@ from ptcc_certify.bounds.deviation.component_bounds import ComponentBounds, Func
 from ptcc_certify.bounds.deviation.heard import HeardRows
 from ptcc_certify.bounds.final_state.attracting_box import AttractingBox
 from ptcc_certify.bounds.final_state.constant_weights import LeadingGroup, leading_groups
-from ptcc_certify.bounds.final_state.labelled_ends import FinalEnds
+from ptcc_certify.bounds.final_state.enclosed_ends import FinalEnds
 from ptcc_certify.bounds.instants import Instants, remaining_part
 from ptcc_certify.certificate.constrained_switching.claims import (
     Claim,
