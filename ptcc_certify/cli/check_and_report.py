@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
 
 from lmi.exact.decimal_rounding import counted
-from ptcc_certify.checker import CheckReport
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.click_options import Command, flag_of
 from ptcc_certify.cli.families import mode_options
@@ -18,6 +17,9 @@ from ptcc_certify.cli.same_graph import READING, compare
 from ptcc_certify.cli.scenario import graph_of
 from ptcc_certify.cli.terminal import Screen, print_json, print_lines, progress, screen_options
 from ptcc_certify.errors import ExitCode, ParameterError
+
+if TYPE_CHECKING:
+    from ptcc_certify.checker import CheckReport
 
 
 @click.command(cls=Command)

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from lmi.exact.decimal_rounding import near, up
-from ptcc_certify.bounds.agents.common_motion import Interval
 from ptcc_certify.bounds.final_state.of_graph import extremes
-from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.fact import Fact, Facts
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.model.agents import DERIVATIVES, PLURALS, plant_text
 from ptcc_certify.report.facts.input import peak_fact
 from ptcc_certify.report.text_layout import TEXT, agent_text, columns, short_number, shorten_list, unbroken
+
+if TYPE_CHECKING:
+    from ptcc_certify.bounds.agents.common_motion import Interval
+    from ptcc_certify.certificate.agents_answer import AgentsAnswer
 
 #: Names of final derivatives on the screen.
 _ENDS = ("x(T)", "v(T)", "a(T)")
