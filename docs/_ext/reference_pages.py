@@ -31,7 +31,7 @@ ROOMS = {
     "simulation": ("Simulation", "simulation.trajectory"),
     "theorems": (
         "Theorems and lemmas",
-        "theorems.table theorems.theorem theorems.lemmas theorems.casadi_lyapunov",
+        "theorems.claims theorems.table theorems.theorem theorems.lemmas theorems.casadi_lyapunov",
     ),
     "gain_design": (
         "Design of gains and deadlines",
