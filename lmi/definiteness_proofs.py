@@ -26,7 +26,6 @@ from lmi.errors import MatrixError
 from lmi.exact import arithmetic, fast
 from lmi.exact.definite import LARGEST_SHIFT, SparseFactor, scaled
 from lmi.exact.numbers import integers
-from lmi.exact.polynomials import characteristic
 from lmi.search_time import checkpoint
 from lmi.sparse_h_matrix import diagonal_factor
 
@@ -377,42 +376,6 @@ def prove_generalized_margin(S: Rows | IntegerRows, Z: Rows | IntegerRows, guess
 
 
 # ---------------------------------------------------------------------- other witnesses
-
-
-def definite_by_polynomial(S: Rows) -> bool:
-    """Decide whether a symmetric rational matrix is positive definite by the signs of its characteristic polynomial.
-
-    All roots of ``det(x I - S) = x^n + c_1 x^(n-1) + ... + c_n`` are real. They are positive iff ``(-1)^k c_k > 0`` for
-    all ``k`` (Descartes). The coefficients are exact; nothing of the other proofs is used. Seconds at n = 40.
-
-    Parameters
-    ----------
-    S : n rows of n Fractions
-        Or other real numbers; a float is the dyadic number that it is.
-
-    Returns
-    -------
-    bool
-        True: positive definite. False: not.
-
-    Raises
-    ------
-    MatrixError
-        As in :func:`prove_positive_definite`.
-
-    References
-    ----------
-    Horn and Johnson, Matrix Analysis, 2nd ed., Cambridge 2013, section 7.2.
-
-    Examples
-    --------
-    >>> definite_by_polynomial([[2, 1], [1, 1]])
-    True
-    >>> definite_by_polynomial([[2, 2], [2, 2]])
-    False
-    """
-    rows = [dict(enumerate(row)) for row in _integers(S)[0]]
-    return all(c * (-1) ** k > 0 for k, c in enumerate(characteristic(rows)))
 
 
 def no_diagonal_rate_above(A: Rows, Y: Rows, rate: Fraction) -> bool:
