@@ -139,7 +139,7 @@ class Evidence(OfQuestion, Shown):
     observed: Observations = field(default_factory=Observations)
 
     @property
-    def question(self) -> Question:  # type: ignore[override]
+    def question(self) -> Question:
         """Of whom it is, under which protocol, from where, and what was asked beside."""
         return self.proof.question
 

@@ -314,9 +314,7 @@ def _told(path: str) -> Any:
 
 
 class OfQuestion:
-    """What a question tells, asked of what answers it."""
-
-    question: Question
+    """What a question tells, asked of what answers it, which has it as ``question``."""
 
     #: The protocol.
     protocol: Protocol = _told("question.protocol")
