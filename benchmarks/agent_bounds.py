@@ -19,8 +19,7 @@ from agent_cases import agent_case
 
 from ptcc_certify.certificate.agents_part import AgentsPart
 from ptcc_certify.certificate.certification import certify
-from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.asks import Asks, InitialState
 
 
 def spectral_ratio(part: AgentsPart) -> float | None:

@@ -17,8 +17,7 @@ from pathlib import Path
 
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.examples import Example, load_graph, select
-from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.asks import Asks, InitialState
 
 
 def one(example: Example, name: str) -> dict[str, float | str]:

@@ -23,8 +23,8 @@ import numpy as np
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.packed_weights import Weights
-from ptcc_certify.lyapunov.interval_rows import IntervalRows
-from ptcc_certify.lyapunov.row_decay import follower_decay, least_rate
+from ptcc_certify.lyapunov.follower_function import follower_decay, least_rate
+from ptcc_certify.lyapunov.follower_rows import IntervalRows
 from ptcc_certify.model import NominalProtocol
 
 LEADERS, DEGREE = 10, 6

@@ -21,9 +21,9 @@ _MODULES = {
     "diagonal": "diagonal_lyapunov diagonal_rate_limit h_matrix_lyapunov rate_frontier refute_diagonal_lyapunov",
     "full": "FullCertificate full_frontier",
     "schur_coupling": "Coupling RhoInterval couple_blocks schur_positive_definite",
-    "definiteness_proofs": "DefinitenessProof ResidualWitness definite_by_polynomial "
-    "no_diagonal_rate_above prove_generalized_margin prove_margin prove_positive_definite",
-    "sparse_definiteness_proofs": "SparseDefinitenessProof prove_sparse_positive_definite",
+    "definiteness_proofs": "DefinitenessProof ResidualWitness SparseDefinitenessProof "
+    "no_diagonal_rate_above prove_generalized_margin prove_margin prove_positive_definite "
+    "prove_sparse_positive_definite",
     "dyadic": "dyadic_integers round_to_bits",
 }
 _EXPORTS = {name: f"lmi.{module}" for module, names in _MODULES.items() for name in names.split()}

@@ -70,9 +70,9 @@ _EXPORTS = {
     "SampledDisturbance": "model.disturbance",
     "StateDependent": "model.disturbance",
     "telegraph_noise": "model.disturbance",
-    "GainLimits": "model.gain_limits",
+    "GainLimits": "model.asks",
     "LateMessages": "model.late_messages",
-    "MovingLeaders": "model.moving_leaders",
+    "MovingLeaders": "model.late_messages",
     # Runs
     "simulate": "simulation.run",
     "Bounded": "simulation.nominal",
@@ -84,7 +84,7 @@ _EXPORTS = {
     "Certificate": "certificate.certificate",
     "Asks": "model.asks",
     "Expectations": "model.asks",
-    "InitialState": "model.initial_state",
+    "InitialState": "model.asks",
     "read_certificate": "certificate.certificate",
     "check": "certificate.checking",
     # Bounds and design
@@ -101,8 +101,8 @@ _EXPORTS = {
     "certify_many": "batch",
     # Figures
     "plot_glance": "report.plots.glance",
-    "plot_motion": "report.plots.motion",
-    "plot_formation": "report.plots.motion",
+    "plot_motion": "report.plots.trajectory",
+    "plot_formation": "report.plots.trajectory",
     "plot_trajectory": "report.plots.trajectory",
     "plot_decay": "report.plots.decay",
     "plot_run": "report.plots.trajectory",

@@ -12,9 +12,7 @@ from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.request import Question, read_initial_state, read_request, read_sliding_variable
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.case import Case
-from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.asks import Asks, Case, InitialState
 
 
 def certify_words(graph: Any, protocol: Any, x0: Any = None, **words: Any) -> Any:

@@ -15,8 +15,7 @@ from ptcc_certify.certificate import graph_certification
 from ptcc_certify.checker import digest
 from ptcc_certify.examples import EXAMPLES, load_graph
 from ptcc_certify.lyapunov.search import search_functions
-from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.asks import Asks, InitialState
 
 NOMINAL = NominalProtocol(T="0.6", rho1="0.2", rho2="0.5", kappa=1)
 SLIDING = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)

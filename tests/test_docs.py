@@ -57,7 +57,7 @@ IN_ROOMS = {
     "bounds.input.initial_sets": ("initial_set_within",),
     "bounds.input.worst_initial_state": ("WorstInitialState",),
     "certificate.assessment": ("Assessment",),
-    "certificate.certificate_file": ("RejectedCertificate",),
+    "certificate.certificate": ("RejectedCertificate",),
     "checker": ("CheckReport",),
     "checker.input_formulas": ("InitialSet",),
     "gain_design.answer": ("Design",),

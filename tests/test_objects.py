@@ -14,10 +14,9 @@ import pytest
 import ptcc_certify as ptcc
 from ptcc_certify.certificate.certification import certify_case
 from ptcc_certify.errors import FormatError, ParameterError
-from ptcc_certify.model.case import Case
+from ptcc_certify.model.asks import Case, GainLimits
 from ptcc_certify.model.disturbance import as_disturbance
 from ptcc_certify.model.gain import Gain
-from ptcc_certify.model.gain_limits import GainLimits
 
 pytestmark = pytest.mark.usefixtures("quick_search")
 

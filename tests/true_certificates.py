@@ -22,8 +22,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.agents import Agents
-from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.asks import Asks, GainLimits
 from ptcc_certify.model.late_messages import LateMessages
 
 CLASSES = dict(all_classes())

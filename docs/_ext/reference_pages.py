@@ -16,8 +16,7 @@ ROOMS = {
     "graphs": ("Graphs and their structure", "graphs.digraph graphs.io graphs.structure graphs.ensembles"),
     "model": (
         "What is asked of what: protocols, agents, messages, disturbances",
-        "model model.gain model.gain_limits model.disturbance model.reaching_time model.case model.asks "
-        "model.initial_state",
+        "model model.gain model.disturbance model.reaching_time model.asks",
     ),
     "certificate": (
         "Certificates",

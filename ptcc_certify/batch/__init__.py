@@ -4,7 +4,7 @@ A row depends on the graph and on the settings alone, not on its place in the li
 for ``seconds``, and for what a time limit cuts off. Files are read where the batch was started and their bytes are
 sent; workers neither read nor write.
 
-:mod:`~ptcc_certify.batch.sources` tells which graphs there are, :mod:`~ptcc_certify.batch.settings` is everything else
+:mod:`~ptcc_certify.batch.sources` tells which graphs there are, :mod:`~ptcc_certify.batch.sources` is everything else
 that a row depends on, and :mod:`~ptcc_certify.batch.rows` makes one row; its columns are listed there. Rows are
 computed by one of the :mod:`~ptcc_certify.batch.backends`; :mod:`~ptcc_certify.batch.output` keeps them as they come,
 and writes the table when all are there, or when a batch ends before.
@@ -21,8 +21,7 @@ from typing import Any
 from ptcc_certify.batch.backends import compute_rows, default_workers
 from ptcc_certify.batch.output import Journal, Table, journal_path, refuse_table, table_bytes
 from ptcc_certify.batch.rows import COLUMNS, Row
-from ptcc_certify.batch.settings import LARGEST_SETTING, Settings
-from ptcc_certify.batch.sources import chosen_sources
+from ptcc_certify.batch.sources import LARGEST_SETTING, Settings, chosen_sources
 from ptcc_certify.certificate.request import listener
 from ptcc_certify.errors import ParameterError, PTCCError
 from ptcc_certify.graphs.ensembles import Ensemble

@@ -21,8 +21,7 @@ from typing import Any
 
 from lmi.child_process import any_thread
 from ptcc_certify.batch.rows import Row, certified_row, failed_row, package_version
-from ptcc_certify.batch.settings import INSTALL, Settings
-from ptcc_certify.batch.sources import Task
+from ptcc_certify.batch.sources import INSTALL, Settings, Task
 from ptcc_certify.errors import ParameterError, one_line
 from ptcc_certify.graphs.rationals import shorten
 

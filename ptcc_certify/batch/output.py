@@ -17,8 +17,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from ptcc_certify.batch.rows import COLUMNS, Row, package_version, printable
-from ptcc_certify.batch.settings import INSTALL, Settings
-from ptcc_certify.batch.sources import Source
+from ptcc_certify.batch.sources import INSTALL, Settings, Source
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.labels import import_pandas
 from ptcc_certify.graphs.rationals import shorten

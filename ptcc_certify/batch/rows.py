@@ -58,14 +58,13 @@ from threadpoolctl import threadpool_limits
 
 import ptcc_certify
 from lmi.exact.decimal_rounding import float_down, float_up
-from ptcc_certify.batch.settings import Settings, StateLike
+from ptcc_certify.batch.sources import Settings, StateLike
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.errors import PTCCError, explain, one_line
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import random_states, read_graph, read_state
-from ptcc_certify.model.asks import Asks, Expectations
-from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.asks import Asks, Expectations, InitialState
 
 #: A row: column by column, None where an entry is empty.
 Row = dict[str, Any]

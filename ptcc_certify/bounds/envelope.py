@@ -22,10 +22,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_up
-from ptcc_certify.bounds.decay import Decay, decayed
+from ptcc_certify.bounds.decay import Decay, ReachingPhase, decayed
 from ptcc_certify.bounds.final_state.of_graph import Influence, influence
 from ptcc_certify.bounds.instants import Instants, clock_values, remaining_part
-from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import as_state
 from ptcc_certify.graphs.rationals import shorten

@@ -14,9 +14,9 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import down, float_up, near, up
 from lmi.exact.elementary_enclosures import sqrt
+from ptcc_certify.bounds.agents.cascade import Values
 from ptcc_certify.bounds.agents.common_motion import Interval
 from ptcc_certify.bounds.agents.each_agent import States, error_constants, first_inputs, scaled_states
-from ptcc_certify.bounds.agents.halved_times import Values
 from ptcc_certify.bounds.agents.run_against_bounds import AgentsComparison
 from ptcc_certify.bounds.final_state.enclosed_ends import agents_ends, weighted_sum
 from ptcc_certify.bounds.final_state.of_graph import Influence, NotEnclosedError

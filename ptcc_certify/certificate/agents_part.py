@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from lmi.exact.decimal_rounding import counted, down, float_down, float_up, near, up
+from ptcc_certify.bounds.agents.cascade import instant_values
 from ptcc_certify.bounds.agents.common_motion import common_motion
 from ptcc_certify.bounds.agents.each_agent import (
     States,
@@ -21,7 +22,6 @@ from ptcc_certify.bounds.agents.each_agent import (
     root_product,
     scaled_states,
 )
-from ptcc_certify.bounds.agents.halved_times import instant_values
 from ptcc_certify.bounds.agents.run_against_bounds import AgentsComparison, compare_agents
 from ptcc_certify.bounds.final_state.enclosed_ends import agents_ends
 from ptcc_certify.bounds.final_state.of_graph import Influence

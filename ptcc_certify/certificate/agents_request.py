@@ -19,9 +19,8 @@ from ptcc_certify.graphs.io.states import as_states, draw_states
 from ptcc_certify.graphs.rationals import shorten, writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.model.agents import DERIVATIVES, MOST_DIMENSION, MOST_TRACKING, PLURALS, Agents
-from ptcc_certify.model.case import Case
+from ptcc_certify.model.asks import Case, InitialState
 from ptcc_certify.model.gain import Gain
-from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.parameters import parameter, readable
 from ptcc_certify.model.refusals import (

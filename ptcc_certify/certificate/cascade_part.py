@@ -9,10 +9,17 @@ from fractions import Fraction
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, float_down, float_up, near, up
-from ptcc_certify.bounds.agents.cascade import Roots, course, drive_integral, input_from, roots_of
+from ptcc_certify.bounds.agents.cascade import (
+    Roots,
+    Values,
+    course,
+    drive_integral,
+    input_from,
+    instant_roots,
+    roots_of,
+)
 from ptcc_certify.bounds.agents.common_motion import LARGEST_DECAY, common_motion
 from ptcc_certify.bounds.agents.each_agent import States, root_product
-from ptcc_certify.bounds.agents.halved_times import Values, instant_roots
 from ptcc_certify.bounds.agents.run_against_bounds import AgentsComparison, compare_with_bounds
 from ptcc_certify.bounds.float_conversion import numbers
 from ptcc_certify.bounds.instants import remaining_part
@@ -24,7 +31,7 @@ from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.model import Protocol
 from ptcc_certify.model.agents import Agents
-from ptcc_certify.model.cascade import CascadeProtocol
+from ptcc_certify.model.agents_protocol import CascadeProtocol
 from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.theorems.theorem import Obligation
 

@@ -17,7 +17,7 @@ from lmi.exact.decimal_rounding import counted
 from lmi.search_time import share_of_time
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.bounds.final_state.attracting_box import AttractingBox, box_of_family
-from ptcc_certify.bounds.final_state.kept_means import with_means
+from ptcc_certify.bounds.final_state.constant_weights import with_means
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.constrained_switching.claims import RateClaim
 from ptcc_certify.certificate.constrained_switching.search import STEP, claims_for, require_nominal
@@ -35,16 +35,21 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float, writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
-from ptcc_certify.lyapunov.common_form_search import CLOSED_ROWS, FULL_ROWS, CommonFormSearch, search_common_forms
-from ptcc_certify.lyapunov.common_forms import CommonForm
+from ptcc_certify.lyapunov.common_form_search import (
+    CLOSED_ROWS,
+    FULL_ROWS,
+    Aim,
+    CommonFormSearch,
+    aimed_functions,
+    search_common_forms,
+)
+from ptcc_certify.lyapunov.common_forms import CommonForm, Quotient
 from ptcc_certify.lyapunov.follower_function import follower_functions
 from ptcc_certify.lyapunov.follower_rows import leading_group
-from ptcc_certify.lyapunov.forms_for_one_state import Aim, aimed_functions
-from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.slow_signals import prove_signal_rate_bound
 from ptcc_certify.lyapunov.squares_function import SquaresFunction, squares_function
 from ptcc_certify.model import Protocol
-from ptcc_certify.model.case import Case
+from ptcc_certify.model.asks import Case
 from ptcc_certify.model.constrained_switching import ClockShares, JointWindows, read_signal
 from ptcc_certify.model.reaching_time import ReachingTime
 from ptcc_certify.theorems.contractions import refuse_impossible_windows

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_up
+from ptcc_certify.bounds.decay import ReachingPhase
 from ptcc_certify.bounds.deviation.component_bounds import ComponentBounds, FunctionOf, RestStates
 from ptcc_certify.bounds.deviation.heard import HeardRows
 from ptcc_certify.bounds.final_state.attracting_box import AttractingBox
-from ptcc_certify.bounds.final_state.kept_means import LeadingGroup, leading_groups
-from ptcc_certify.bounds.final_state.labelled_ends import FinalEnds
+from ptcc_certify.bounds.final_state.constant_weights import LeadingGroup, leading_groups
+from ptcc_certify.bounds.final_state.enclosed_ends import FinalEnds
 from ptcc_certify.bounds.instants import Instants, remaining_part
-from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.certificate.constrained_switching.claims import (
     Claim,
     FinalValueClaim,
@@ -30,7 +30,7 @@ from ptcc_certify.certificate.constrained_switching.claims import (
     WindowClaim,
 )
 from ptcc_certify.certificate.functions import ProvedFunction
-from ptcc_certify.certificate.proof import Proof
+from ptcc_certify.certificate.request import Proof
 from ptcc_certify.checker.common_kernel_ends import agents_heard, limits
 from ptcc_certify.checker.protocol import last_time, sliding_bounded, sliding_part
 from ptcc_certify.checker.reading import Interval
@@ -39,9 +39,8 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.structure import STABILITY
-from ptcc_certify.lyapunov.common_forms import CommonForm
+from ptcc_certify.lyapunov.common_forms import CommonForm, Quotient
 from ptcc_certify.lyapunov.follower_function import FollowerFunction
-from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.slow_signals import SignalRateBound
 from ptcc_certify.model.constrained_switching import SignalClass
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent

@@ -27,12 +27,10 @@ from ptcc_certify.checker.weighted_squares import FactorWitness, SquaresSection
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.lyapunov.common_forms import CommonForm, prove_ends, weighted_mean
-from ptcc_certify.lyapunov.follower_function import FollowerFunction, LeadingPart
+from ptcc_certify.lyapunov.common_forms import CommonForm, Quotient, prove_ends, weighted_mean
+from ptcc_certify.lyapunov.follower_function import FollowerDecay, FollowerFunction, LeadingPart
 from ptcc_certify.lyapunov.function import DeviationBound, Dominance, LyapunovBlock, LyapunovFunction
-from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.rate_upper_bound import RateBound
-from ptcc_certify.lyapunov.row_decay import FollowerDecay
 from ptcc_certify.lyapunov.squares_function import FormTable, SquaresFunction
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
 from ptcc_certify.theorems.theorem import Obligation

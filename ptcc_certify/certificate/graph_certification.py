@@ -34,8 +34,7 @@ from ptcc_certify.certificate.agents_request import (
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.evidence import Observations
 from ptcc_certify.certificate.graph_proof import GraphProof
-from ptcc_certify.certificate.proof import OfQuestion
-from ptcc_certify.certificate.request import Question
+from ptcc_certify.certificate.request import OfQuestion, Question
 from ptcc_certify.certificate.verdict import MANY_DECADES
 from ptcc_certify.errors import HypothesisError, ParameterError, SimulationError
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -55,7 +54,7 @@ from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.base import ReachingProtocol
 from ptcc_certify.model.disturbance import as_disturbance
 from ptcc_certify.model.reaching_time import ReachingTime
-from ptcc_certify.simulation.instants import PAST
+from ptcc_certify.simulation.nominal import PAST
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.sliding import rounding_slack
 from ptcc_certify.simulation.trajectory import Trajectory

@@ -22,9 +22,13 @@ from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.model.base import Protocol
 from ptcc_certify.model.constrained_switching import ClockShares, JointWindows
-from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
-from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
-from ptcc_certify.theorems.last_mode import last_mode_shows
+from ptcc_certify.theorems.family_behaviour import (
+    DEPENDS,
+    FamilyComponent,
+    counterexample_text,
+    last_mode_shows,
+    mode_name,
+)
 
 
 def judge(proof: GraphProof | FamilyProof) -> Iterator[Answer]:

@@ -1,4 +1,4 @@
-"""What is asked of :func:`ptcc_certify.certify`, read and refused where it does not fit."""
+"""What is asked of :func:`ptcc_certify.certify`, refused where it does not fit; what proofs that answer it share."""
 
 from __future__ import annotations
 
@@ -7,13 +7,17 @@ import os
 from collections.abc import Callable, Iterable, Mapping, Sequence, Sized
 from dataclasses import dataclass, field
 from fractions import Fraction
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from lmi.exact.numbers import MAX_SCALE_BITS
+from ptcc_certify.bounds.delay.late_messages import LateBounds
+from ptcc_certify.bounds.input.effort import Effort
 from ptcc_certify.bounds.input.initial_sets import read_initial_set
+from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.errors import Change, NumberError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -23,12 +27,9 @@ from ptcc_certify.graphs.rationals import as_fraction, shorten, writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.model import Protocol
-from ptcc_certify.model.asks import Expectations
-from ptcc_certify.model.case import Case
+from ptcc_certify.model.asks import Case, Expectations, GainLimits, InitialState
 from ptcc_certify.model.constrained_switching import SignalClass, read_signal
-from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.initial_state import InitialState
-from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 from ptcc_certify.model.parameters import parameter
 from ptcc_certify.model.reaching_time import ReachingTime, certified_reaching_times
 
@@ -279,3 +280,136 @@ def _instant(at: Any, protocol: Protocol) -> Fraction:
             "give one from 0 on and below it",
         )
     return instant
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """The file that a certificate was read from, accepted by the independent check.
+
+    Attributes
+    ----------
+    path : Path
+    sha256 : str
+        Of the file.
+    document : mapping
+        Its JSON. What stands under ``unverified`` is the file's own word.
+    report : CheckReport
+        Of the independent check.
+    effort : Effort or None
+        What is proved about the input.
+    files : mapping of str to bytes
+        The side files that stood beside it, by name.
+    """
+
+    path: Path
+    sha256: str
+    document: Mapping[str, Any]
+    report: CheckReport
+    effort: Effort | None
+    files: Mapping[str, bytes] = field(repr=False)
+
+
+def _told(path: str) -> Any:
+    return property(attrgetter(path))
+
+
+class OfQuestion:
+    """What a question tells, asked of what answers it, which has it as ``question``."""
+
+    #: The protocol.
+    protocol: Protocol = _told("question.protocol")
+    #: ``X(0)``.
+    initial_state: tuple[Fraction, ...] | None = _told("question.initial_state")
+    #: ``sigma(0)`` of the sliding-mode protocol; None for the nominal one.
+    sigma0: tuple[Fraction, ...] | None = _told("question.sigma0")
+    #: The names of the agents.
+    labels: Sequence[str] = _told("question.labels")
+    #: What was asked.
+    request: Request = _told("question.request")
+    #: What is asked besides.
+    expectations: Expectations = _told("question.request.expectations")
+    #: What the graph is called, and where initial states come from.
+    origins: Mapping[str, str] = _told("question.request.origins")
+    #: Which Lyapunov functions were searched.
+    method: str = _told("question.request.method")
+    #: Instant for which the bound was optimised, in units of time.
+    at: Fraction | None = _told("question.request.at")
+    #: The set of initial states for which the input is bounded; None: that of ``initial_state`` alone.
+    initial_set: InitialSet | None = _told("question.request.initial_set")
+    #: Limits of the gain that are judged besides.
+    limits: tuple[Limits, ...] = _told("question.request.limits")
+    #: Nominal protocol: bound of the disturbances that are judged besides, in units of the input.
+    delta: Fraction | None = _told("question.request.delta")
+    #: Nominal protocol: bound of the measurement noise that is judged under each of the limits.
+    noise: Fraction | None = _told("question.request.noise")
+    #: Seconds that the searches were given, infinity for no limit.
+    time_limit: float = _told("question.request.time_limit")
+
+    @property
+    def only_drawn(self) -> bool:
+        """Whether the question is of a set of initial states, and the one at hand drawn for the simulated run."""
+        return self.initial_set is not None and "x(0)" in self.request.origins
+
+    @property
+    def direct(self) -> bool:
+        """Whether the decay begins at 0: nominal protocol, or ``sigma(0) = 0``."""
+        return not any(self.sigma0 or ())
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Proof(OfQuestion):
+    """What is proved of a graph or of a family.
+
+    Attributes
+    ----------
+    question : Question
+    reaching : tuple of N ReachingTime, or None
+        When each sliding variable is proved to be 0, whatever the disturbance.
+    late : LateBounds or None
+        What holds with late messages, and while leaders move; None where neither was asked.
+    source : Source or None
+        The file that it was read from.
+    offsets : tuple of N Fraction, or None
+        Places of agents in a formation on a line: initial and final state and everything else are of ``x - offsets``;
+        :attr:`initial_positions` and ``final_positions`` are of ``x``.
+    """
+
+    question: Question
+    reaching: tuple[ReachingTime, ...] | None = None
+    late: LateBounds | None = None
+    source: Source | None = None
+    offsets: tuple[Fraction, ...] | None = None
+
+    @property
+    def initial_positions(self) -> tuple[Fraction, ...] | None:
+        """Where agents begin: in a formation ``initial_state`` is less their places."""
+        if self.offsets is None or self.initial_state is None:
+            return self.initial_state
+        return tuple(x + h for x, h in zip(self.initial_state, self.offsets, strict=True))
+
+    @property
+    def asked_messages(self) -> LateMessages | None:
+        """How late messages are; None where they come at once and exactly."""
+        messages = self.request.messages if self.late is None else self.late.messages
+        return None if messages is None or messages.tracks else messages
+
+    @property
+    def asked_leaders(self) -> MovingLeaders | None:
+        """How leaders move."""
+        messages = self.request.messages if self.late is None else self.late.messages
+        return None if messages is None else messages.leaders
+
+    @property
+    def leaders_move(self) -> bool:
+        """Whether leaders move."""
+        return self.asked_leaders is not None and self.asked_leaders.moving
+
+    @property
+    def vehicles(self) -> Mapping[str, Sequence[Fraction]] | None:
+        """Of agents that exchange virtual positions ``v(0)``, of a team ``order`` and ``a(0)``; None without them."""
+        vehicles = None if self.late is None else self.late.messages.vehicles
+        if vehicles is None:
+            return None
+        orders = None if vehicles.team is None else tuple(map(Fraction, vehicles.team))
+        told = {"order": orders, "v(0)": vehicles.v0, "a(0)": vehicles.a0}
+        return {name: values for name, values in told.items() if values is not None}

@@ -8,8 +8,8 @@ from fractions import Fraction
 
 import numpy as np
 
+from ptcc_certify.bounds.decay import ReachingPhase
 from ptcc_certify.bounds.envelope import FLOOR_FACTOR
-from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten

@@ -31,13 +31,13 @@ from ptcc_certify.errors import one_line
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure, behaviour_name
-from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.common_forms import Quotient
 from ptcc_certify.lyapunov.search import METHODS
 from ptcc_certify.lyapunov.slow_signals import Member, SignalRateBound, prove_again
 from ptcc_certify.model.base import Protocol
 from ptcc_certify.model.constrained_switching import SignalClass
 from ptcc_certify.model.late_messages import LateMessages
-from ptcc_certify.theorems.counterexample_text import mode_name
+from ptcc_certify.theorems.family_behaviour import mode_name
 
 #: Of what it is read where it comes from.
 ORIGINS = ("graph", "read", "x(0)", "v(0)", "a(0)", "sigma(0)")

@@ -12,10 +12,8 @@ from ptcc_certify.cli.options import Options, read_initial_state, with_prejudice
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.model.agents import Agents
-from ptcc_certify.model.case import Case
-from ptcc_certify.model.initial_state import InitialState
-from ptcc_certify.model.late_messages import LateMessages
-from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.asks import Case, InitialState
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 
 if TYPE_CHECKING:
     from fractions import Fraction

@@ -28,7 +28,7 @@ def animate(certificate: str, output: str | None, seconds: float, time_unit: str
     The certificate is of one graph of at most 40 agents, with an initial state, and is checked first. An .html is one
     page with buttons; .mp4 needs the program ffmpeg.
     """
-    from ptcc_certify.certificate.certificate_file import RejectedCertificate
+    from ptcc_certify.certificate.certificate import RejectedCertificate
 
     if output is None:
         output = f"{PurePath(certificate).stem.lstrip('-') or 'certificate'}.gif"

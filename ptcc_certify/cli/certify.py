@@ -18,9 +18,7 @@ from ptcc_certify.cli.click_options import Command, one_of
 from ptcc_certify.cli.scenario import scenario_record
 from ptcc_certify.cli.terminal import LOG, Screen, in_flags, print_json, progress, refuse_output, screen_options
 from ptcc_certify.errors import one_line
-from ptcc_certify.model.asks import Asks, Expectations
-from ptcc_certify.model.case import Case
-from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.asks import Asks, Case, Expectations, InitialState
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate

@@ -131,7 +131,7 @@ def report(certificate: str, output: str, simulation: bool | None, memory: float
     certificate.json. The page is one file that loads nothing and runs no script. Exit codes are those of `check`; of a
     rejected certificate the page tells the reason and no claim.
     """
-    from ptcc_certify.certificate.certificate_file import RejectedCertificate
+    from ptcc_certify.certificate.certificate import RejectedCertificate
 
     try:
         with progress(("independent check", "simulation", "report")) as begin:

@@ -30,7 +30,7 @@ def classify(graph: tuple[str, ...], expect: str | None, as_json: bool, screen: 
     """
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.graphs.structure import analyse
-    from ptcc_certify.report.facts.of_structure import structure_facts
+    from ptcc_certify.report.facts.graph import structure_facts
 
     with progress(("graph", "structure")) as begin:
         begin("graph")

@@ -19,13 +19,9 @@ from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import OPTIONAL, PREJUDICE, STUBBORN, UNCERTAINTY, Reading
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.agents import Agents
-from ptcc_certify.model.asks import Asks, Expectations
+from ptcc_certify.model.asks import Asks, Expectations, GainLimits, InitialState, Run
 from ptcc_certify.model.constrained_switching import CLOCK_DWELL, ClockShares, DwellTime, JointWindows
-from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.initial_state import InitialState
-from ptcc_certify.model.late_messages import LateMessages
-from ptcc_certify.model.moving_leaders import MovingLeaders
-from ptcc_certify.model.run import Run
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 
 Decorator = Callable[[Any], Any]
 

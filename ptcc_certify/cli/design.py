@@ -19,10 +19,7 @@ from ptcc_certify.errors import ExitCode, ParameterError, one_line
 from ptcc_certify.gain_design.request import DesignRequest
 from ptcc_certify.graphs.rationals import short_exact
 from ptcc_certify.model import SlidingModeProtocol
-from ptcc_certify.model.asks import Asks, Expectations
-from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.initial_state import InitialState
-from ptcc_certify.model.run import Run
+from ptcc_certify.model.asks import Asks, Expectations, GainLimits, InitialState, Run
 from ptcc_certify.report.text_layout import wrap_command
 
 if TYPE_CHECKING:
@@ -143,7 +140,7 @@ def _show(
 ) -> int:
     """Print the answer, and the command that proves it again; return the exit code."""
     from ptcc_certify.gain_design.answer import INFEASIBLE, MET
-    from ptcc_certify.report.facts.of_structure import design_facts
+    from ptcc_certify.report.facts.graph import design_facts
 
     if as_json:
         print_json(answer.to_dict() | {"command": None if command is None else " ".join(command)})

@@ -74,8 +74,8 @@ def _published(name: str, output: str | None, suffix: str) -> int:
     recorded = True
     with progress([entry.name for entry in selection]) as begin:
         begin(selection[0].name)
+        from ptcc_certify.report.example_results import PUBLISHED_HEAD, certify_published
         from ptcc_certify.report.plots.style import save_figure
-        from ptcc_certify.report.published_results import PUBLISHED_HEAD, certify_published
 
         print_lines(*PUBLISHED_HEAD)
         for entry in selection:
@@ -123,7 +123,7 @@ def cite(theorem: tuple[str, ...]) -> int:
 
     software prints that of this program.
     """
-    from ptcc_certify.certificate.certificate_file import RejectedCertificate
+    from ptcc_certify.certificate.certificate import RejectedCertificate
     from ptcc_certify.theorems.table import cite as bibtex
     from ptcc_certify.theorems.table import cite_software
 

@@ -29,8 +29,7 @@ def explore(graph: str, port: int, no_browser: bool, **options: Any) -> int:
     address with a random token, and loads nothing from elsewhere. Ctrl-C ends it, with exit code 0
     once the address is printed.
     """
-    from ptcc_certify.report.explorer.model import Explorer
-    from ptcc_certify.report.explorer.question import reading_of
+    from ptcc_certify.report.explorer.model import Explorer, reading_of
     from ptcc_certify.report.explorer.server import open_server
     from ptcc_certify.report.explorer.settings import Settings
 

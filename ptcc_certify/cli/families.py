@@ -18,14 +18,20 @@ from ptcc_certify.errors import ExitCode, ParameterError, items_of, one_line
 from ptcc_certify.graphs.declared_option import options_of
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import OPTIONAL, UNCERTAINTY
-from ptcc_certify.model.constrained_switching import CLOCK_DWELL, WINDOWS_OF_TIME, ClockShares, DwellTime, JointWindows
+from ptcc_certify.model.constrained_switching import (
+    CLOCK_DWELL,
+    WINDOWS_OF_TIME,
+    ClockShares,
+    DwellTime,
+    JointWindows,
+    SignalClass,
+)
 from ptcc_certify.model.refusals import NOT_OF_FAMILIES
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.model import Protocol
-    from ptcc_certify.model.constrained_switching import SignalClass
     from ptcc_certify.theorems.family_behaviour import FamilyComponent
 
 #: Options of certify that families do not take; agents are refused by themselves, disturbances by the protocol.
@@ -205,8 +211,8 @@ def _show_decision(
     screen: Screen,
     options: shared.Options,
 ) -> None:
-    from ptcc_certify.certificate.classification_document import decision_document
-    from ptcc_certify.report.facts.of_structure import decision_facts
+    from ptcc_certify.certificate.graph_sections import decision_document
+    from ptcc_certify.report.facts.graph import decision_facts
 
     if as_json:
         print_json(decision_document(family, components))
@@ -302,8 +308,7 @@ def refuse_options(options: shared.Options, certified: bool = False) -> None:
 
 def _constant_alone(constant: Sequence[FamilyComponent], every: Sequence[FamilyComponent]) -> Sequence[FamilyComponent]:
     """Return what constant signals do where neither all signals nor single modes show it; nothing where they do."""
-    from ptcc_certify.theorems.family_behaviour import DEPENDS
-    from ptcc_certify.theorems.last_mode import last_mode_behaviours
+    from ptcc_certify.theorems.family_behaviour import DEPENDS, last_mode_behaviours
 
     follows = all(
         None not in last_mode_behaviours(other) if other.behaviour == DEPENDS else one.behaviour == other.behaviour

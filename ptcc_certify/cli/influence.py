@@ -112,7 +112,7 @@ def _of_captured(structure: Structure, text: str, radius: str) -> Answer:
     """Tell how far agents move others, of a text of their labels, or ``all``."""
     from ptcc_certify.bounds.final_state.captured import captured, ranking, ranking_csv
     from ptcc_certify.graphs.size_limits import EXACT_NODES
-    from ptcc_certify.report.facts.captured import captured_facts, ranking_facts
+    from ptcc_certify.report.facts.influence import captured_facts, ranking_facts
 
     labels, size = structure.graph.labels, exact_number(radius, "--radius")
     exact = len(labels) <= EXACT_NODES

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ptcc_certify.cli.click_options import flag_of, given_of, names_of, options_for
 from ptcc_certify.cli.options import Options, graph_file
 from ptcc_certify.errors import NumberError, ParameterError
-from ptcc_certify.model.late_messages import LateMessages
-from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 from ptcc_certify.model.parameters import parameter
 
 if TYPE_CHECKING:
@@ -26,11 +25,6 @@ _ASKING = ("delay", "period", "quantisation")
 def asks_for_messages(options: Options) -> bool:
     """Tell whether something is asked of late, lost or rounded messages."""
     return any(options.get(name) is not None for name in _ASKING)
-
-
-def asks_for_leaders(options: Options) -> bool:
-    """Tell whether leaders move."""
-    return bool(given_of(MovingLeaders, options))
 
 
 def messages_of(graphs: Sequence[str], signed: SignedDigraph | Family, options: Options) -> LateMessages | None:

@@ -23,17 +23,13 @@ from ptcc_certify.graphs.declared_option import options_of
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import PREJUDICE, STUBBORN, Reading, option_flags
 from ptcc_certify.graphs.recognised_files import TOML, kind_of, refuse_as_certificate, refuse_as_graph, shell_word
-from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.model.asks import Asks, Expectations
-from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.initial_state import InitialState
-from ptcc_certify.model.run import Run
+from ptcc_certify.model import NominalProtocol, Protocol, SlidingModeProtocol
+from ptcc_certify.model.asks import Asks, Expectations, GainLimits, InitialState, Run
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
-    from ptcc_certify.model import Protocol
 
 #: What the commands are given, by the names of their parameters.
 Options = Mapping[str, Any]

@@ -17,9 +17,7 @@ from ptcc_certify.cli.scenario import MEMORY, graph_of, refuse_beside
 from ptcc_certify.cli.terminal import FIGURES, print_lines, progress, refuse_output
 from ptcc_certify.errors import ExitCode, ParameterError
 from ptcc_certify.graphs.recognised_files import kind_of
-from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.case import Case
-from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.asks import Asks, Case, InitialState
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
@@ -119,7 +117,7 @@ def plot(
     Of a family - its certificate, or several graphs with --switching, weights in intervals, --uncertainty, --optional -
     runs under many signals are drawn within what is proved for every signal.
     """
-    from ptcc_certify.certificate.certificate_file import RejectedCertificate
+    from ptcc_certify.certificate.certificate import RejectedCertificate
 
     certified = kind_of(graph[0]) in ("a certificate", "JSON")
     if certified and len(graph) > 1:

@@ -8,19 +8,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 from click.core import ParameterSource
 
+from ptcc_certify.checker import CheckReport
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.click_options import flag_of
 from ptcc_certify.cli.families import family_keywords, files_of, graph_or_family
 from ptcc_certify.errors import FormatError, PTCCError
 from ptcc_certify.graphs.recognised_files import shell_word
-
-if TYPE_CHECKING:
-    from ptcc_certify.checker import CheckReport
 
 #: Options that tell how files of graphs and families are read.
 READING = (*shared.READING, "stubborn", "uncertainty", "optional")

@@ -24,8 +24,7 @@ from ptcc_certify.graphs.declared_option import Option
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import OPTIONAL, UNCERTAINTY
 from ptcc_certify.graphs.recognised_files import TOML, kind_of, refuse_as_graph
-from ptcc_certify.model.late_messages import LateMessages
-from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 
 #: Largest file, in bytes.
 MAX_BYTES = 1_000_000

@@ -22,13 +22,9 @@ from ptcc_certify.errors import ExitCode, ParameterError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.recognised_files import kind_of
 from ptcc_certify.lazy_report import rendered
-from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.case import Case
-from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.initial_state import InitialState
-from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.asks import Asks, Case, GainLimits, InitialState, Run
+from ptcc_certify.model.late_messages import MovingLeaders
 from ptcc_certify.model.refusals import refuse_in_places
-from ptcc_certify.model.run import Run
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -149,8 +145,7 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
 
 def _of_certificate(graph: tuple[str, ...], output: str | None, samples: int, look: dict[str, Any]) -> int:
     """Write the run of what a certificate is about, which is checked first, at as many instants as that of a graph."""
-    from ptcc_certify.certificate.certificate import read_certificate
-    from ptcc_certify.certificate.certificate_file import RejectedCertificate
+    from ptcc_certify.certificate.certificate import RejectedCertificate, read_certificate
 
     shared.refuse_beside_certificate(graph[0], ("graph", "output", *look))
     if len(graph) > 1:

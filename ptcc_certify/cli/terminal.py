@@ -19,11 +19,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ptcc_certify.errors import ParameterError, PTCCError, one_line
+from ptcc_certify.errors import Change, ParameterError, PTCCError, Sentence, one_line
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.fact import Fact
-    from ptcc_certify.errors import Change, Sentence
 
 #: What figures are written as; :mod:`ptcc_certify.report.plots.style` has them too.
 FIGURES = (".png", ".pdf", ".svg")

@@ -39,31 +39,185 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from lmi.exact.decimal_rounding import up
-from ptcc_certify.bounds.input.initial_sets import initial_set_within
+from lmi.exact.elementary_enclosures import rounded, sqrt
+from ptcc_certify.bounds.input.initial_sets import initial_set_within, ways
+from ptcc_certify.bounds.input.tightest_bound import decaying, log, usable_functions
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker import INPUT_NODES
-from ptcc_certify.checker.input_formulas import InitialSet
+from ptcc_certify.checker.input_formulas import BITS, InitialSet, Linear
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.gain_design.answer import INFEASIBLE, MET, UNPROVED, Design, refusal
-from ptcc_certify.gain_design.gain_candidates import Option, decimal, options
-from ptcc_certify.gain_design.request import DesignRequest, Fit, fit_of
-from ptcc_certify.gain_design.shortest_possible import lower_product
+from ptcc_certify.gain_design.answer import DIGITS, INFEASIBLE, MET, UNPROVED, Design, refusal
+from ptcc_certify.gain_design.request import DesignRequest, Fit, fit_of, input_bounds
+from ptcc_certify.graphs.digraph import Exact
 from ptcc_certify.graphs.rationals import nearest_float, shorten
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.model import NominalProtocol
-from ptcc_certify.model.asks import Asks, Expectations
-from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.asks import Asks, Expectations, GainLimits
 from ptcc_certify.model.parameters import parameter
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
 
-if TYPE_CHECKING:
-    from ptcc_certify.graphs.digraph import Exact
+#: ``rho1 T / k`` is sought between these.
+_LEAST, _MOST = 1e-3, 1e6
+
+
+class Option(NamedTuple):
+    """Gains in units of a deadline: ``rho1 T``, ``k``, the clock of a capped gain or None, and about what ``phi``."""
+
+    a: Fraction
+    k: Fraction
+    clock: Fraction | None
+    product: Fraction
+
+
+def options(base: Certificate, request: DesignRequest) -> list[Option]:
+    """Return gains by increasing ``phi``: the best without a cap, and a cap for each function if a residual is allowed.
+
+    In units of ``k`` and the largest ``m_v`` everything is free of dimensions.
+    """
+    bounds, residual = input_bounds(base, request.initial_set), request.residual
+    functions = usable_functions(bounds)
+    agents: list[int | None] = [None] if request.input_norm == 2 else [*range(len(bounds.rows))]
+    largest = [bounds.error_norm if v is None else bounds.error_bounds[v] for v in agents]
+    top = max(largest)
+    if base.proof.constant or top == 0 or not functions:
+        return [Option(Fraction(1), Fraction(1), None, Fraction(0))] if base.proof.constant or top == 0 else []
+    rates = {i: bounds.form(i).rate for i in functions}
+    decay = {i: [decaying(bounds, i, v) for v in agents] for i in functions}
+    moving = [j for j, h in enumerate(largest) if h and all(decay[i][j] for i in functions)]
+    size = np.array([nearest_float(largest[j] / top) for j in moving])
+    over = {i: np.array([log(decay[i][j] / largest[j]) for j in moving]) for i in functions}
+    least = 2 / max(rates.values())
+    best = (math.inf, 1.0, least)
+    for i in functions:
+        k = decimal(2 / rates[i], up=True)
+        may = [j for j in functions if rates[j] * k >= 2]
+        # The clock of the crossing, over k.
+        clocks = np.array([over[j] * nearest_float(2 / (rates[j] * k)) for j in may])
+        which, every = clocks.argmin(axis=0), np.arange(len(moving))
+        crossing = clocks[which, every]
+        share = size * np.exp(np.minimum(np.array([over[j] for j in may])[which, every], 0))
+        a, peak = least_peak(np.maximum(crossing, 0), share)
+        if peak * nearest_float(k / least) < best[0] * (1 - 1e-9):
+            best = (peak * nearest_float(k / least), a, k)
+    product, a, k = best
+    options = []
+    if math.isfinite(product):
+        options.append(Option(decimal(Fraction(a) * k), k, None, Fraction(product) * least * top))
+    if residual is not None:
+        for i in functions:
+            bound = base.graph_proof.functions[i].deviation
+            if bound is None:
+                continue
+            excess = max(map(log, bound.agents)) / 2 + log(bounds.initial_root(i)) - log(residual)
+            clock = decimal(Fraction(max(excess, 1e-6) * (1 + 1e-12)) * 2 / rates[i], up=True)
+            options.append(Option(clock, k, clock, clock * top))
+    return sorted(options, key=lambda option: option.product)
+
+
+def least_peak(clocks: np.ndarray, sizes: np.ndarray) -> tuple[float, float]:
+    """Return the ``a`` that makes ``max_v sizes_v (a + e^(z_v))`` least, ``a (1 - e^(-z_v)) + z_v = clocks_v``, and it.
+
+    Examples
+    --------
+    >>> a, peak = least_peak(np.array([1.0]), np.array([1.0]))  # with a = 0 it is e
+    >>> round(a, 3), round(peak, 3)
+    (0.403, 2.588)
+    """
+    from scipy.optimize import minimize_scalar
+
+    grid = np.geomspace(_LEAST, _MOST, 28)
+    values = [peak_factor(a, clocks, sizes) for a in grid]
+    i = int(np.argmin(values))
+    ends = (grid[max(i - 1, 0)], grid[min(i + 1, len(grid) - 1)])
+    near = minimize_scalar(
+        lambda a: peak_factor(a, clocks, sizes), bounds=ends, method="bounded", options={"xatol": 1e-9 * ends[1]}
+    )
+    return min([(float(near.x), float(near.fun)), (float(grid[i]), float(values[i]))], key=lambda pair: pair[1])
+
+
+def peak_factor(a: float, clocks: np.ndarray, sizes: np.ndarray) -> float:
+    """Return ``max_v sizes_v (a + e^(z_v))``, ``a (1 - e^(-z_v)) + z_v = clocks_v``, for ``k = 1``.
+
+    The clock is concave in ``z``, so that Newton's method from below grows to the root.
+
+    Examples
+    --------
+    >>> round(peak_factor(0.0, np.array([1.0]), np.array([1.0])), 6)
+    2.718282
+    """
+    z = np.maximum(clocks / (1 + a), clocks - a)
+    for _ in range(40):
+        step = (clocks + a * np.expm1(-z) - z) / (a * np.exp(-z) + 1)
+        z = z + step
+        if np.abs(step).max(initial=0) <= 1e-13 * (1 + z.max(initial=0)):
+            break
+    with np.errstate(over="ignore"):
+        return float((sizes * (a + np.exp(z))).max(initial=0.0))
+
+
+def decimal(x: Fraction, up: bool = False) -> Fraction:
+    """Round a nonnegative rational to a few decimal digits, to nearest or upwards.
+
+    Examples
+    --------
+    >>> float(decimal(Fraction(2, 3))), float(decimal(Fraction(1, 3), up=True)), float(decimal(Fraction(0)))
+    (0.6666666667, 0.3333333334, 0.0)
+    """
+    if not x:
+        return x
+    shift = DIGITS - 1 - math.floor(log(x) / math.log(10))
+    unit = Fraction(10) ** shift
+    scaled = x * unit
+    return Fraction(math.ceil(scaled) if up else round(scaled)) / unit
+
+
+_PRODUCT_BITS = 40
+
+
+def lower_product(base: Certificate, request: DesignRequest) -> tuple[Fraction | None, str]:
+    """Return what ``U T`` is at least, whatever the gains, and why; None if nothing is known."""
+    proof = base.graph_proof
+    candidates = [(Fraction(0), "")]
+    initial_set, graph = request.initial_set, proof.graph
+    agents = [shorten(label) for label in graph.labels]
+    if proof.influence.exact and graph.n_nodes <= INPUT_NODES:
+        for agent, row in zip(agents, ways(proof.influence), strict=True):
+            way = _largest_below(initial_set, row) - (request.residual or 0)
+            candidates.append((way, f"the way of agent {agent} to its final state"))
+    limit = proof.upper_bound
+    if request.residual is None and limit and _has_inner_points(initial_set):
+        for agent, weights in zip(agents, graph.exact_rows(range(graph.n_nodes)), strict=True):
+            candidates.append(
+                (2 / limit * _largest_below(initial_set, weights), f"the input of agent {agent} at t = 0")
+            )
+    best, why = max(candidates, key=lambda entry: entry[0])
+    return (rounded(best, _PRODUCT_BITS) if best > 0 else None), why
+
+
+def _largest_below(initial_set: InitialSet, row: Linear) -> Fraction:
+    """Bound the largest size of a linear function over the set from below; exact but for an ellipsoid's root."""
+    if not initial_set.axes:
+        return initial_set.largest(row)
+    size = abs(sum((x * initial_set.center[j] for j, x in row.items()), Fraction(0)))
+    shares = [sum((x * axis[j] for j, x in row.items()), Fraction(0)) for axis in initial_set.axes]
+    return size + sqrt(rounded(sum((x * x for x in shares), Fraction(0)), BITS), BITS)[0]
+
+
+def _has_inner_points(initial_set: InitialSet) -> bool:
+    """Tell whether the set spans all directions, so that an input bounded on it is bounded for every initial state."""
+    if not initial_set.axes:
+        return bool(initial_set.radius) and min(initial_set.radius) > 0
+    import flint
+
+    rows = [[flint.fmpq(x.numerator, x.denominator) for x in axis] for axis in initial_set.axes]
+    return flint.fmpq_mat(rows).rank() == len(initial_set.center)
+
 
 #: The exact bound is not below what the search finds by such a factor.
 _HOPELESS = Fraction(1001, 1000)

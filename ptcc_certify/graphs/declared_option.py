@@ -117,7 +117,7 @@ def options_of(*kinds: Any) -> Mapping[str, Option]:
 
     Examples
     --------
-    >>> from ptcc_certify.model.moving_leaders import MovingLeaders
+    >>> from ptcc_certify.model.late_messages import MovingLeaders
     >>> {name: told.key for name, told in options_of(MovingLeaders).items() if name in ("speed", "saturation")}
     {'speed': 'leaders.speed', 'saturation': 'limits.saturation'}
     """

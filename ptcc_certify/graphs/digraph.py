@@ -19,9 +19,8 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 import numpy as np
 
 from ptcc_certify.errors import FormatError, GraphError, NumberError, gated
-from ptcc_certify.graphs.array_holders import ReadOnly
 from ptcc_certify.graphs.labels import first_five, import_pandas, in_all, labels_beside, place_of, refuse_unnamed
-from ptcc_certify.graphs.packed_weights import LARGEST_WEIGHT, SMALLEST_WEIGHT, Weights
+from ptcc_certify.graphs.packed_weights import LARGEST_WEIGHT, SMALLEST_WEIGHT, ReadOnly, Weights
 from ptcc_certify.graphs.rationals import Exact, as_fraction, shorten, writable
 from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.lazy_report import Shown

@@ -21,10 +21,10 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import counted
 from ptcc_certify.errors import ParameterError, did_you_mean
-from ptcc_certify.graphs.array_holders import ReadOnly
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.graphs.labels import import_pandas
+from ptcc_certify.graphs.packed_weights import ReadOnly
 from ptcc_certify.lazy_report import Shown
 
 if TYPE_CHECKING:

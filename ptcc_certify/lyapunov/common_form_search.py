@@ -4,9 +4,29 @@ A search proposes a matrix ``P`` and multipliers in floats; they are rounded to 
 each mode is lowered until the kernel accepts one definite integer matrix of size n + q for it. Nothing enumerates the
 ``2^q`` vertices of a box.
 
+Families whose members share a positive left null vector: the distance to the states at rest, in closed form.
+
+Let ``p > 0`` and ``p' M(L) = 0`` for every member, ``M(L)`` with ``-|w|`` off the diagonal: known weights that share
+``p``, and uncertain undirected edges between nodes of equal ``p`` (``p = 1`` for undirected graphs). Then
+
+    x'(diag(p) L + L' diag(p)) x = sum_kl p_k |w_kl| (x_k - sgn(w_kl) x_l)^2
+
+grows with every weight: ``w-`` is the worst case, whatever the signal. The weighted distance to ``K`` decays at the
+rate ``b`` if ``S - b P > 0`` over the nodes that are no pivots, ``S`` the matrix above at ``w-`` and
+``P = diag(p) - diag(p) B (B' diag(p) B)^-1 B' diag(p)``: ``B' diag(p) X`` is constant. Where ``diag(p) L(w-)`` is
+symmetric in the slowest mode, no rate of any kind is larger.
+
+Forms for one initial state and a few instants: what is proved of deviations and inputs there is made small.
+
+A form of rate ``r`` bounds ``|y'xi|`` at the clock ``s`` by ``|y|_* sqrt(V(0)) e^(-r s / 2)``, ``|y|_*^2 = y'P^-1 y``.
+Among all forms of a rate that is a little below the largest, those of least ``V(0)`` are taken that have ``|y|_* <= 1``
+for the coordinates, and for the rows of inputs.
+
 References
 ----------
 docs/theory/families.md, "Common quadratic functions", "Uncertain weights" and "Undirected graphs".
+docs/theory/families.md, "Undirected graphs".
+docs/theory/families.md, "Common quadratic functions".
 """
 
 from __future__ import annotations
@@ -16,21 +36,125 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import product
 
 import numpy as np
 
 from lmi.common_closed_form import closed_form_lyapunov
-from lmi.common_lyapunov import CommonCertificate, best_multipliers, common_lyapunov, least_condition
+from lmi.common_lyapunov import CommonCertificate, best_multipliers, common_lyapunov, least_condition, least_value
 from lmi.dyadic import round_to_bits
 from lmi.errors import NoCertificate
 from lmi.search_time import checkpoint, part_of_time, share_of_time
 from ptcc_certify.checker.matrix_products import LARGEST_ROWS, WITH_MULTIPLIERS
+from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.size_limits import EXACT_NODES
-from ptcc_certify.lyapunov.common_forms import CommonForm, form_with_constants, prove_mode
-from ptcc_certify.lyapunov.common_left_vector import undirected_function
+from ptcc_certify.lyapunov.common_forms import CommonForm, Quotient, form_with_constants, prove_margin_about, prove_mode
 from ptcc_certify.lyapunov.error_system import rounded_matrix
-from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.search_failures import failures_told
+from ptcc_certify.theorems.lemmas import Matrix, solve_exact
+
+Vector = tuple[Fraction, ...]
+
+
+def undirected_function(quotient: Quotient) -> CommonForm | None:
+    """Return the function of the module, proved; None if no common left vector is found.
+
+    Nor is one tried above 120 nodes, or where nothing moves.
+
+    Examples
+    --------
+    >>> path = Family.from_intervals([("a", "b", 1, 10), ("b", "c", 1, 10)], undirected=True)
+    >>> V = undirected_function(Quotient(path))
+    >>> round(float(V.rate), 6), V.optimal
+    (2.0, True)
+    """
+    family = quotient.family
+    p = common_left_vector(family)
+    if p is None:
+        return None
+    P = _distance(quotient, p)
+    rates, symmetric = [], []
+    for mode, own in zip(family.modes, quotient.modes, strict=True):
+        checkpoint()
+        L = mode.mandatory.exact_laplacian()
+        S = [[p[i] * L[i][j] + p[j] * L[j][i] for j in quotient.nodes] for i in quotient.nodes]
+        rate = Fraction(0) if own.at_rest else prove_margin_about(S, P, _least_eigenvalue(S, P), own.largest_entry)
+        if rate is None:
+            return None
+        rates.append(rate)
+        nodes = range(family.n_nodes)
+        symmetric.append(all(p[i] * L[i][j] == p[j] * L[j][i] for i in nodes for j in nodes if i < j))
+    moving = [i for i, own in enumerate(quotient.modes) if not own.at_rest]
+    if not moving:
+        return None
+    optimal = symmetric[min(moving, key=lambda i: rates[i])]
+    return form_with_constants("undirected", quotient, P, rates, ((),) * len(rates), optimal)
+
+
+def common_left_vector(family: Family) -> Vector | None:
+    """Return ``p > 0`` with ``p' M(L) = 0`` for every member, exact; None if none is found or nodes are too many.
+
+    It is all ones, or the one left null vector of the sum of all mandatory graphs.
+
+    Examples
+    --------
+    >>> common_left_vector(Family.from_graph(SignedDigraph.from_edges([(1, 2, -3), (2, 1, 1)])))
+    (Fraction(3, 4), Fraction(1, 4))
+    """
+    n = family.n_nodes
+    if any(mode.parameters.size and not mode.tied for mode in family.modes) or n > EXACT_NODES:
+        return None
+    comparisons, zero = [_comparison(mode) for mode in family.modes], Fraction(0)
+    ones = (Fraction(1),) * n
+    if _shared(family, comparisons, ones):
+        return ones
+    total = [[sum((M[i][j] for M in comparisons), zero) for j in range(n)] for i in range(n)]
+    system = [[total[j][i] for j in range(n)] for i in range(n - 1)] + [list(ones)]
+    solution = solve_exact(system, [[zero]] * (n - 1) + [[Fraction(1)]])
+    if solution is None or any(row[0] <= 0 for row in solution):
+        return None
+    p = tuple(row[0] for row in solution)
+    return p if _shared(family, comparisons, p) else None
+
+
+def _comparison(mode: Mode) -> Matrix:
+    L = mode.mandatory.exact_laplacian()
+    return [[x if i == j else -abs(x) for j, x in enumerate(row)] for i, row in enumerate(L)]
+
+
+def _shared(family: Family, comparisons: list[Matrix], p: Vector) -> bool:
+    for mode, M in zip(family.modes, comparisons, strict=True):
+        ends = ((int(mode.source[e]), int(mode.target[e])) for e in mode.parameters)
+        if any(p[source] != p[target] for source, target in ends):
+            return False
+        if any(sum(map(Fraction.__mul__, p, column), Fraction(0)) for column in zip(*M, strict=True)):
+            return False
+    return True
+
+
+def _distance(quotient: Quotient, p: Vector) -> Matrix:
+    """Return ``P`` of the module over the nodes that are no pivots."""
+    nodes, d = quotient.nodes, len(quotient.pivots)
+    P = [[p[v] if v == u else Fraction(0) for u in nodes] for v in nodes]
+    if not d:
+        return P
+    B, zero = quotient.basis, Fraction(0)
+    gram = [[sum((w * b[i] * b[j] for w, b in zip(p, B, strict=True)), zero) for j in range(d)] for i in range(d)]
+    part = solve_exact(gram, [[p[v] * B[v][j] for v in nodes] for j in range(d)])
+    assert part is not None, "B has full rank"
+    for row, v in zip(P, nodes, strict=True):
+        for j in range(d):
+            if scale := p[v] * B[v][j]:
+                row[:] = [x - scale * y for x, y in zip(row, part[j], strict=True)]
+    return P
+
+
+def _least_eigenvalue(S: Matrix, P: Matrix) -> float:
+    from scipy.linalg import eigh
+
+    arrays = (np.array([[float(x) for x in row] for row in M]) for M in (S, P))
+    return float(eigh(*arrays, eigvals_only=True, subset_by_index=[0, 0])[0])
+
 
 #: Classes of functions.
 KINDS = ("undirected", "diagonal", "full")
@@ -219,3 +343,88 @@ def prove_certificate(
             return None
         rates[number] = rate
     return form_with_constants(kind, quotient, matrix, rates, multipliers)
+
+
+#: By what factor a form must improve a bound at some instant.
+_BETTER = 1.1
+#: What of the identity is added to a sum of squares of rows, against its trace.
+_REST = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Aim:
+    """Where bounds should be small.
+
+    Attributes
+    ----------
+    begin : (n,) array
+        The initial state in quotient coordinates, up to a factor; not 0.
+    clocks : (M,) array
+        Instants of the stretched clock.
+    """
+
+    begin: np.ndarray
+    clocks: np.ndarray
+
+
+def aimed_functions(
+    quotient: Quotient, aim: Aim, known: Sequence[CommonForm], notes: list[str]
+) -> Iterator[CommonForm]:
+    """Yield proved functions, each of which improves a bound of an aim over those before it.
+
+    Parameters
+    ----------
+    quotient : Quotient
+        Of 2 to 24 rows.
+    aim : Aim
+    known : sequence of CommonForm
+        Functions at hand; nothing is yielded without one that decays.
+    notes : list of str
+        Is told what failed.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.family import Family
+    >>> from ptcc_certify.lyapunov.common_form_search import search_common_forms
+    >>> from ptcc_certify.theorems.family_behaviour import decide
+    >>> chain = Family.from_intervals([("a", "b", 1, 2), ("b", "c", 1, 2)])
+    >>> quotient = Quotient.of(decide(chain)[0])
+    >>> known, aim = search_common_forms(quotient, slower=False).functions, Aim(np.array([1.0, 0.0]), np.array([2.0]))
+    >>> [V.kind for V in aimed_functions(quotient, aim, known, [])]
+    ['full', 'full']
+    """
+    top = max((float(V.rate) for V in known), default=0.0)
+    if top <= 0:
+        return
+    numbers = [number for number, mode in enumerate(quotient.modes) if not mode.at_rest]
+    modes = [quotient.modes[number] for number in numbers]
+    rows = np.array([[float(x) for x in row] for mode in modes for row in mode.rows if any(row)])
+    rows /= np.abs(rows).max()
+    best = np.min([_log_bounds(np.array(V.matrix, dtype=float), float(V.rate), aim, rows) for V in known], axis=0)
+    units = np.eye(len(aim.begin))
+    squares = rows.T @ rows
+    floors = (units, squares + _REST * np.trace(squares) * units)
+    arrays = [mode.array for mode in modes]
+    for rate, floor in product((top * (1 - loss) for loss in _LOSSES), floors):
+        form = None
+        with failures_told(notes, "full"):  # a smaller rate is easier
+            form = least_value(arrays, [rate] * len(arrays), aim.begin, floor)
+        if form is None:
+            continue
+        bounds = _log_bounds(form.matrix, form.rate, aim, rows)
+        if (bounds < best - math.log(_BETTER)).any():
+            function = prove_certificate(quotient, "full", form, numbers)
+            if function is None:
+                notes.append(f"class full: the rate {form.rate:.6g} is not proved")
+            else:
+                best = np.minimum(best, bounds)
+                yield function
+
+
+def _log_bounds(P: np.ndarray, rate: float, aim: Aim, rows: np.ndarray) -> np.ndarray:
+    """Return logarithms of the bounds of the largest coordinate and row, up to a factor, at the instants, (2, M)."""
+    inverse = np.linalg.inv(P)
+    sizes = inverse.diagonal().max(), np.einsum("ki,ij,kj->k", rows, inverse, rows).max()
+    value = float(aim.begin @ P @ aim.begin)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray((np.log(np.array(sizes)[:, None] * value) - rate * aim.clocks) / 2)

@@ -26,18 +26,16 @@ from typing import Any
 import numpy as np
 
 import lmi
-from lmi.definiteness_proofs import prove_generalized_margin
+from lmi.definiteness_proofs import SparseDefinitenessProof, prove_generalized_margin, prove_sparse_positive_definite
 from lmi.dyadic import round_array, round_to_bits
 from lmi.errors import LMIError, NoCertificate
-from lmi.sparse_definiteness_proofs import SparseDefinitenessProof, prove_sparse_positive_definite
 from lmi.sparse_h_matrix import FILL_ROWS, SparseHMatrix, fill_core
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import Dominance, GroupProof, LyapunovBlock, LyapunovFunction
 from ptcc_certify.theorems.leaders_and_followers import prove_connectivity
-from ptcc_certify.theorems.lemmas import dyadic_left_vector, gauge, left_vector
-from ptcc_certify.theorems.matrix_arithmetic import diagonal_matrix, symmetric_product
+from ptcc_certify.theorems.lemmas import diagonal_matrix, dyadic_left_vector, gauge, left_vector, symmetric_product
 
 #: Relative deviations of ``t`` below the smallest eigenvalue: the larger, the smaller the overshoot constant.
 LOSSES = (1e-5, 1e-2, 0.1, 0.5, 0.9, 0.99, 1.0)

@@ -10,25 +10,22 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING
 
+import flint
 import numpy as np
 
 from lmi.definiteness_proofs import prove_generalized_margin
 from lmi.dyadic import round_to_bits
 from ptcc_certify.graphs.structure import ClosedComponent, Structure
-from ptcc_certify.theorems.lemmas import left_vector
-from ptcc_certify.theorems.matrix_arithmetic import (
+from ptcc_certify.theorems.lemmas import (
     Matrix,
     exact_block,
     float_block,
     integer_matrix,
     integer_rows,
+    left_vector,
     multiply,
 )
-
-if TYPE_CHECKING:
-    import flint
 
 #: Bits of the rounded factor of the exact basis.
 _BASIS_BITS = 53

@@ -17,11 +17,10 @@ from typing import Any
 import numpy as np
 
 import lmi
+from lmi.definiteness_proofs import SparseDefinitenessProof
 from lmi.exact.decimal_rounding import float_down, float_up
-from lmi.sparse_definiteness_proofs import SparseDefinitenessProof
 from ptcc_certify.checker.lyapunov_form import Form
-
-Matrix = list[list[Fraction]]
+from ptcc_certify.theorems.lemmas import Matrix
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,8 +26,7 @@ from ptcc_certify.graphs.rationals import writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.error_system import rounded_matrix
-from ptcc_certify.theorems.lemmas import component_blocks, single_followers
-from ptcc_certify.theorems.matrix_arithmetic import Matrix, integer_matrix, integer_rows
+from ptcc_certify.theorems.lemmas import Matrix, component_blocks, integer_matrix, integer_rows, single_followers
 
 #: Relative amounts by which ``c`` lies above the smallest real part, one after the other, until the proof succeeds.
 _GAPS = (1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1)

@@ -33,8 +33,7 @@ from ptcc_certify.lyapunov.error_system import ErrorSystem, rounded_diagonal, ro
 from ptcc_certify.lyapunov.function import LyapunovBlock, LyapunovFunction
 from ptcc_certify.lyapunov.search_failures import failures_told
 from ptcc_certify.model.asks import METHODS
-from ptcc_certify.theorems.lemmas import laplacian_spectrum, left_vector
-from ptcc_certify.theorems.matrix_arithmetic import BITS, diagonal_matrix
+from ptcc_certify.theorems.lemmas import BITS, diagonal_matrix, laplacian_spectrum, left_vector
 
 DIAGONAL = ("perron", "lmi")
 #: Largest leader group of a large graph whose best diagonal matrix is searched, and where that is asked for.

@@ -30,10 +30,9 @@ from lmi.dyadic import round_to_bits
 from lmi.search_time import checkpoint
 from lmi.uncertain_matrix import UncertainMatrix
 from ptcc_certify.graphs.size_limits import EXACT_NODES
-from ptcc_certify.lyapunov.common_forms import CommonForm, rounded_up
-from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.common_forms import CommonForm, Quotient, rounded_up
 from ptcc_certify.lyapunov.rate_upper_bound import prove_slow_eigenvalues
-from ptcc_certify.theorems.matrix_arithmetic import Matrix
+from ptcc_certify.theorems.lemmas import Matrix
 
 Vector = tuple[Fraction, ...]
 #: Relative amounts by which an eigenvalue is raised, one after the other, until the proof succeeds.

@@ -26,18 +26,18 @@ from typing import Any
 
 import numpy as np
 
+from lmi.definiteness_proofs import prove_sparse_positive_definite
 from lmi.dyadic import dyadic_array, round_array, round_to_bits
 from lmi.exact import arithmetic
 from lmi.exact.decimal_rounding import down
 from lmi.exact.definite import SparseFactor
 from lmi.search_time import checkpoint
-from lmi.sparse_definiteness_proofs import prove_sparse_positive_definite
 from lmi.sparse_h_matrix import FILL_ROWS, fill_core, solve
 from ptcc_certify.checker.family import Edge
 from ptcc_certify.checker.weighted_squares import WeightedSquares
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.rationals import nearest_float
-from ptcc_certify.lyapunov.interval_rows import IntervalRows
+from ptcc_certify.lyapunov.follower_rows import IntervalRows
 
 #: Values of ``t`` over the largest in-weight, and losses of the rate that are tried.
 _SHIFTS, _LOSSES = (1e-6, 1e-2, 0.03, 0.1, 0.3, 1.0), (1e-6, 1e-4, 1e-2, 0.1, 0.3)

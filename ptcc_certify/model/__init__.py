@@ -1,7 +1,5 @@
 """What is asked of what: protocols, agents, messages, leaders, limits; each field declares its option once."""
 
-from ptcc_certify.model.base import Protocol, ReachingProtocol
-from ptcc_certify.model.nominal import NominalProtocol
-from ptcc_certify.model.sliding_mode import SlidingModeProtocol
+from ptcc_certify.model.base import NominalProtocol, Protocol, ReachingProtocol, SlidingModeProtocol
 
 __all__ = ["NominalProtocol", "Protocol", "ReachingProtocol", "SlidingModeProtocol"]

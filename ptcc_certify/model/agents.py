@@ -47,7 +47,7 @@ class Agents:
         ``alpha > 0``: agents of order 2 meet at rest, by ``-alpha eta`` times their own velocity; gains as designed.
     cascade : number or str, optional
         ``alpha > 0``: double integrators track the velocity that the paper's protocol commands, at this rate per unit
-        of the clock. No gain depends on the graph; see :class:`~ptcc_certify.model.cascade.CascadeProtocol`.
+        of the clock. No gain depends on the graph; see :class:`~ptcc_certify.model.agents_protocol.CascadeProtocol`.
     decay : number or str, optional
         ``R = r rho2 kappa``: deviations decay like ``(1 - t/T)^(R/2)`` near ``T``; above ``2 (n - 1)``. By default
         ``2 n``, from which on the input is bounded; single integrators without it run the paper's protocol, ``K = 1``.

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ptcc_certify.errors import NumberError, ParameterError, gated
-from ptcc_certify.graphs.array_holders import ByValue
+from ptcc_certify.graphs.packed_weights import ByValue
 from ptcc_certify.graphs.rationals import Exact, as_fraction, nearest_float, shorten, whole_number
 from ptcc_certify.model.casadi_latex import to_latex
 from ptcc_certify.model.expression import ATOMS, Program, enclosure, floats, parse, symbolic

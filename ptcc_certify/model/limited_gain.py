@@ -16,18 +16,15 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ptcc_certify.checker.input_formulas import Limits
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.model.gain import Gain
 from ptcc_certify.model.parameters import readable
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
 
 MAX_PERIODS = 10**6
 # 1 - t/T below which nothing can act any more.

@@ -18,7 +18,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -26,10 +26,8 @@ from lmi.exact.decimal_rounding import down, float_down, near, up
 from lmi.exact.elementary_enclosures import decay_integrals_below, rounded
 from ptcc_certify.checker import REACHING_BITS
 from ptcc_certify.errors import SimulationError
+from ptcc_certify.model.base import ReachingProtocol
 from ptcc_certify.model.disturbance import Disturbance, WorstCaseDisturbance
-
-if TYPE_CHECKING:
-    from ptcc_certify.model.base import ReachingProtocol
 
 #: Beyond this z the time is T_r to the last bit of a float.
 LAST_Z = 40.0

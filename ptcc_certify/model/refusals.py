@@ -13,9 +13,8 @@ from ptcc_certify.model.base import Protocol, refuse_no_protocol
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.structure import Structure
-    from ptcc_certify.model.case import Case
-    from ptcc_certify.model.late_messages import LateMessages
-    from ptcc_certify.model.moving_leaders import MovingLeaders
+    from ptcc_certify.model.asks import Case
+    from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 
 #: What is asked of one graph alone.
 NOT_OF_FAMILIES = (*("at", "initial_set", "limits", "delta", "noise", "agents", "simulation", "disturbance"),)
@@ -62,7 +61,7 @@ def refuse_before_the_graph(case: Case) -> None:
 
     Examples
     --------
-    >>> from ptcc_certify.model.case import Case
+    >>> from ptcc_certify.model.asks import Case
     >>> refuse_before_the_graph(Case("fig1a", NominalProtocol(rho2=0)))
     Traceback (most recent call last):
     ptcc_certify.errors.ParameterError: rho2 = 0 gives no deadline; give rho2 > 0, and for what the constant gain ...
@@ -87,7 +86,7 @@ def asked_of_signals(structure: Structure, case: Case) -> bool:
 
     Examples
     --------
-    >>> from ptcc_certify.model.case import Case
+    >>> from ptcc_certify.model.asks import Case
     >>> pair = analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1)]))
     >>> asked_of_signals(pair, Case(pair.graph, NominalProtocol(), messages=LateMessages(value_error=1)))
     True
@@ -164,7 +163,7 @@ def refuse_beside_virtual_positions(case: Case) -> None:
 
     Examples
     --------
-    >>> from ptcc_certify.model.case import Case
+    >>> from ptcc_certify.model.asks import Case
     >>> agents, limits = Agents(order=2, exchange="virtual"), GainLimits(stop_before="0.1")
     >>> refuse_beside_virtual_positions(Case("fig1a", NominalProtocol(), agents=agents, limits=limits))
     Traceback (most recent call last):

@@ -20,10 +20,9 @@ import numpy as np
 
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import as_graph
-from ptcc_certify.model.base import aligned, position_latex, symbols
+from ptcc_certify.model.base import aligned, coupling, position_latex, symbols
 from ptcc_certify.model.casadi_latex import to_latex
 from ptcc_certify.model.gain import Gain
-from ptcc_certify.model.nominal import coupling
 
 if TYPE_CHECKING:
     import casadi as ca

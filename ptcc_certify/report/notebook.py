@@ -21,9 +21,8 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.size_limits import SHOWN_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
-from ptcc_certify.report.facts.graph import family_text
+from ptcc_certify.report.facts.graph import decision_facts, design_facts, family_text, structure_facts
 from ptcc_certify.report.facts.of_certificate import facts_of
-from ptcc_certify.report.facts.of_structure import decision_facts, design_facts, structure_facts
 from ptcc_certify.report.plots.glance import plot_glance
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.style import figure_bytes

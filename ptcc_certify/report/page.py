@@ -24,8 +24,7 @@ import jinja2
 from markupsafe import Markup
 
 from lmi.exact.decimal_rounding import counted
-from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.certificate_file import RejectedCertificate
+from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate
 from ptcc_certify.certificate.constrained_switching.bounds import nearer_for_signal
 from ptcc_certify.certificate.fact import Fact
 from ptcc_certify.certificate.runs_against_bounds import compare
@@ -37,11 +36,11 @@ from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.model.agents import plant_text
 from ptcc_certify.report import html_text as texts
 from ptcc_certify.report.facts.agents import claimed_of
-from ptcc_certify.report.facts.beside_law import beside_law
 from ptcc_certify.report.facts.claim import assumptions
 from ptcc_certify.report.facts.constrained_switching import signal_text
 from ptcc_certify.report.facts.decay import BOUND_KINDS
 from ptcc_certify.report.facts.graph import leader_facts
+from ptcc_certify.report.facts.late import beside_law
 from ptcc_certify.report.facts.of_certificate import facts_of
 from ptcc_certify.report.html_text import rational
 from ptcc_certify.report.page_figures import Counterexamples, counterexamples, draw, inline_figure, run_of_agents
@@ -376,7 +375,7 @@ def _bound_words(saved: Certificate) -> list[Markup]:
     bound, family = part.upper_bound, saved.family_proof.family
     assert bound is not None
     from ptcc_certify.certificate.unverified_section import upper_bound_entry
-    from ptcc_certify.lyapunov.quotient import Quotient
+    from ptcc_certify.lyapunov.common_forms import Quotient
 
     lines = []
     for member, duration in zip(

@@ -23,17 +23,15 @@ from ptcc_certify.report.plots.distributions import plot_degrees, plot_final_sta
 from ptcc_certify.report.plots.glance import plot_glance
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.input import plot_input
-from ptcc_certify.report.plots.motion import plot_formation, plot_motion
 from ptcc_certify.report.plots.spectrum import plot_spectrum
 from ptcc_certify.report.plots.style import figure_bytes
 from ptcc_certify.report.plots.subject import is_of_family
 from ptcc_certify.report.plots.tracking import plot_tracking
-from ptcc_certify.report.plots.trajectory import plot_sliding, plot_trajectory
+from ptcc_certify.report.plots.trajectory import plot_formation, plot_motion, plot_sliding, plot_trajectory
 from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.simulation.late_messages import can_run
 from ptcc_certify.simulation.trajectory import Trajectory
-from ptcc_certify.theorems.counterexample_text import counterexample_text
-from ptcc_certify.theorems.family_behaviour import DEPENDS, Counterexample, FamilyComponent
+from ptcc_certify.theorems.family_behaviour import DEPENDS, Counterexample, FamilyComponent, counterexample_text
 
 #: What draws each figure of a certificate, on given axes or its own; all but the graph show its simulated run.
 PLOTS: dict[str, Callable[..., Any]] = {

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ptcc_certify.certificate.assessment import CERTIFIED, OPEN, REFUTED
-from ptcc_certify.certificate.certificate import Certificate, read_certificate
-from ptcc_certify.certificate.certificate_file import RejectedCertificate
+from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate, read_certificate
 from ptcc_certify.certificate.checking import refuse_no_certificate
 from ptcc_certify.certificate.request import listener
 from ptcc_certify.errors import ParameterError, SimulationError

@@ -25,17 +25,16 @@ from ptcc_certify.model.agents import plant_text
 from ptcc_certify.model.casadi_latex import symbol_latex
 from ptcc_certify.report import html_text as texts
 from ptcc_certify.report.facts.agents import claimed_of
-from ptcc_certify.report.facts.beside_law import beside_law
 from ptcc_certify.report.facts.claim import assumptions
 from ptcc_certify.report.facts.constrained_switching import signal_text
+from ptcc_certify.report.facts.late import beside_law
 from ptcc_certify.report.facts.of_certificate import facts_of
 from ptcc_certify.report.latex_text import latex_of_number, latex_of_sentence, latex_of_text
 from ptcc_certify.report.page import THEOREM, protocol_latex
 from ptcc_certify.report.page_states_table import state_rows
 from ptcc_certify.report.plots.subject import ideal_text
 from ptcc_certify.report.text_layout import arithmetic
-from ptcc_certify.theorems.counterexample_text import mode_name
-from ptcc_certify.theorems.family_behaviour import DEPENDS
+from ptcc_certify.theorems.family_behaviour import DEPENDS, mode_name
 
 #: Agents up to which ``W`` is printed (a matrix of amsmath has 10 columns), and edges up to which these are.
 _MATRIX, _EDGES = 10, 60

@@ -20,11 +20,10 @@ import numpy as np
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.rationals import shorten, whole_number
 from ptcc_certify.model.agents_protocol import AgentsProtocol
-from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.asks import GainLimits
 from ptcc_certify.simulation.cvodes import Motion, Phase, Tolerances
-from ptcc_certify.simulation.instants import Instants
 from ptcc_certify.simulation.member_laplacians import Members
-from ptcc_certify.simulation.nominal import sample
+from ptcc_certify.simulation.nominal import Instants, sample
 from ptcc_certify.simulation.trajectory import ByAgent, csv_text
 
 if TYPE_CHECKING:

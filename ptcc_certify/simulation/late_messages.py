@@ -25,16 +25,15 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import as_graph, as_state
 from ptcc_certify.graphs.rationals import shorten, whole_number
 from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.model.asks import GainLimits
 from ptcc_certify.model.base import Protocol, refuse_no_protocol
 from ptcc_certify.model.gain import Gain
-from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.late_messages import LateMessages, told_leaders
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders, told_leaders
 from ptcc_certify.model.limited_gain import LimitedGain
-from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.refusals import refuse_together
 from ptcc_certify.simulation.cvodes import Tolerances
-from ptcc_certify.simulation.instants import MOST_STEPS, STEP_SHARE, Instants, steps_towards
 from ptcc_certify.simulation.moving_leaders import WorstLeaders
+from ptcc_certify.simulation.nominal import MOST_STEPS, STEP_SHARE, Instants, steps_towards
 from ptcc_certify.simulation.trajectory import Conditions, Setup, Trajectory
 
 Pattern = Literal["oldest", "fresh", "varying", "square"]

@@ -31,12 +31,12 @@ from ptcc_certify.graphs.io import as_graph, as_state
 from ptcc_certify.graphs.rationals import whole_number
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
+from ptcc_certify.model.asks import GainLimits
 from ptcc_certify.model.base import Protocol, refuse_no_protocol
-from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.late_messages import MovingLeaders
 from ptcc_certify.model.refusals import refuse_leader_groups, refuse_together
 from ptcc_certify.simulation.cvodes import Tolerances
-from ptcc_certify.simulation.instants import MOST_STEPS, STEP_SHARE, Instants, steps_towards
+from ptcc_certify.simulation.nominal import MOST_STEPS, STEP_SHARE, Instants, steps_towards
 from ptcc_certify.simulation.trajectory import JUST_BEFORE, Conditions, Setup, Trajectory
 
 #: Steps up to T; how near they come; where a run ends.

@@ -14,36 +14,39 @@ import inspect
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
 from ptcc_certify.errors import ParameterError, gated, unknown_parameter
+from ptcc_certify.graphs.digraph import Exact, SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import as_family, as_graph, as_states
 from ptcc_certify.graphs.io.conversion import is_family
 from ptcc_certify.graphs.rationals import number_within, shorten
 from ptcc_certify.model import Protocol
+from ptcc_certify.model.asks import GainLimits
 from ptcc_certify.model.base import refuse_no_protocol
 from ptcc_certify.model.disturbance import StateDependent, as_disturbance
-from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.late_messages import LateMessages, told_leaders
-from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders, told_leaders
 from ptcc_certify.model.refusals import refuse_together
 from ptcc_certify.simulation.cvodes import Motion, Tolerances
-from ptcc_certify.simulation.instants import PAST, default_instants, wanted_instants
 from ptcc_certify.simulation.interrupt import interruptible
 from ptcc_certify.simulation.late_messages import simulate_late
 from ptcc_certify.simulation.member_laplacians import Choice, Members
 from ptcc_certify.simulation.moving_leaders import simulate_tracking
-from ptcc_certify.simulation.nominal import Bounded, as_forcing, sample, sample_and_hold
+from ptcc_certify.simulation.nominal import (
+    PAST,
+    Bounded,
+    as_forcing,
+    default_instants,
+    sample,
+    sample_and_hold,
+    wanted_instants,
+)
 from ptcc_certify.simulation.sliding import SlidingMotion, rounding_slack
-from ptcc_certify.simulation.switched_motion import Course
-from ptcc_certify.simulation.switching_signals import ConstantSignal, Signal, as_signal
+from ptcc_certify.simulation.switching_signals import ConstantSignal, Course, Signal, as_signal
 from ptcc_certify.simulation.trajectory import RESOLVED, Conditions, Played, Setup, Trajectory
-
-if TYPE_CHECKING:
-    from ptcc_certify.graphs.digraph import Exact, SignedDigraph
 
 
 class RunOptions(TypedDict, total=False):
@@ -109,7 +112,7 @@ def simulate(
     The nominal protocol gives ``X' = -gain(t) L X``. The sliding-mode protocol under a disturbance gives the Filippov
     solution: every sliding variable reaches 0 at a root of its own equation and stays there.
 
-    The nominal protocol may act under :class:`~ptcc_certify.model.gain_limits.GainLimits`, and under a disturbance
+    The nominal protocol may act under :class:`~ptcc_certify.model.asks.GainLimits`, and under a disturbance
     and measurement noise: ``X' = -gain(t) L (X + n) + d``, the gain being the one that acts.
 
     Parameters

@@ -22,16 +22,15 @@ from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.model.disturbance import TOLERANCE, Disturbance, StateDependent, WorstCaseDisturbance
 from ptcc_certify.model.reaching_time import LAST_Z, ReachingProblem, worst_case
 from ptcc_certify.simulation.cvodes import Drive, Motion, Phase, Tolerances
-from ptcc_certify.simulation.instants import Instants, tau_before
-from ptcc_certify.simulation.member_laplacians import Choice
-from ptcc_certify.simulation.switched_motion import Course, Leg
+from ptcc_certify.simulation.member_laplacians import Choice, Members
+from ptcc_certify.simulation.nominal import Instants, tau_before
+from ptcc_certify.simulation.switching_signals import Course, Leg
 from ptcc_certify.simulation.trajectory import Sliding
 
 if TYPE_CHECKING:
     import casadi as ca
 
     from ptcc_certify.model import ReachingProtocol
-    from ptcc_certify.simulation.member_laplacians import Members
 
 # The imitation with a boundary layer goes so far towards each pole: 1 - t/T = 1e-13.
 _LAYER_Z = 30.0

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ptcc_certify.errors import ParameterError, gated
-from ptcc_certify.graphs.array_holders import ByValue
 from ptcc_certify.graphs.labels import import_pandas, position
+from ptcc_certify.graphs.packed_weights import ByValue
 from ptcc_certify.graphs.rationals import number_within, shorten
 from ptcc_certify.lazy_report import Shown, rendered
-from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.simulation.instants import Instants
+from ptcc_certify.model.asks import GainLimits
 from ptcc_certify.simulation.member_laplacians import Choice, Members
+from ptcc_certify.simulation.nominal import Instants
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,9 +27,8 @@ if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.model import Protocol, ReachingProtocol
-    from ptcc_certify.model.late_messages import LateMessages
+    from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
     from ptcc_certify.model.limited_gain import LimitedGain
-    from ptcc_certify.model.moving_leaders import MovingLeaders
     from ptcc_certify.model.virtual_positions import TrackingProtocol
     from ptcc_certify.simulation.cvodes import Tolerances
 

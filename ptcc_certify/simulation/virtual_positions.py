@@ -14,12 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.asks import GainLimits
 from ptcc_certify.model.virtual_positions import Vehicles, tracking_input
 from ptcc_certify.simulation.agents import MOST_STATES, AgentsMotion, AgentsTrajectory, instants_left
-from ptcc_certify.simulation.instants import Instants
 from ptcc_certify.simulation.late_messages import simulate_late
-from ptcc_certify.simulation.nominal import sample
+from ptcc_certify.simulation.nominal import Instants, sample
 from ptcc_certify.simulation.run import simulate
 
 if TYPE_CHECKING:
@@ -29,9 +28,8 @@ if TYPE_CHECKING:
 
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.model.base import Protocol
-    from ptcc_certify.model.late_messages import LateMessages
+    from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
     from ptcc_certify.model.limited_gain import LimitedGain
-    from ptcc_certify.model.moving_leaders import MovingLeaders
     from ptcc_certify.model.virtual_positions import TrackingProtocol
     from ptcc_certify.simulation.cvodes import Phase
     from ptcc_certify.simulation.trajectory import Trajectory

@@ -12,10 +12,16 @@ linear time. Otherwise agents that follow several groups, or a group of which th
 are rational numbers.
 
 A *constant* signal is one member, which nobody knows: then each behaviour is decided on edges alone.
+
+Where agents end under signals that switch finitely often before the deadline: where the last mode leads them.
+
+The stretched clock is infinite after the last switch. So the last mode does what it does by itself, from the state in
+which the others left the agents (docs/theory/families.md, "The last mode").
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -24,10 +30,10 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.decimal_rounding import counted
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import ParameterError, unlabelled
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.io import as_family
-from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.rationals import nearest_float, shorten
 from ptcc_certify.graphs.structure import (
     BIPARTITE_CONSENSUS,
     BIPARTITE_CONTAINMENT,
@@ -497,3 +503,182 @@ def _bridges(mode: Mode) -> set[frozenset[int]]:
 
     pairs = nx.Graph(zip(mode.source.tolist(), mode.target.tolist(), strict=True))
     return set(map(frozenset, nx.bridges(pairs)))
+
+
+#: Names that are listed, edges of a closed walk, and characters of a name.
+_LISTED, _STEPS, _WIDTH = 4, 8, 24
+#: Characters of a sentence about a state, of which fewer values are listed rather than that its end is cut off.
+_SENTENCE = 105
+
+
+def counterexample_text(component: FamilyComponent, why: Counterexample, mark: Callable[[str], str] = str) -> str:
+    """Tell in one sentence what refutes a behaviour of a component for every signal.
+
+    Parameters
+    ----------
+    component : FamilyComponent
+        Whose nodes and modes ``why`` numbers.
+    why : Counterexample
+    mark : callable
+        How a label or the name of a mode is marked.
+
+    Returns
+    -------
+    str
+        Without a full stop.
+
+    Examples
+    --------
+    >>> from ptcc_certify.theorems.family_behaviour import decide
+    >>> (pair,) = decide(Family.from_intervals([("a", "b", 0, 1), ("b", "a", 1, 2)]))
+    >>> counterexample_text(pair, pair.refutation("stability"))
+    'held constant and its optional edges off, b hears nobody else and keeps its value'
+    """
+    family, names = component.family, [mark(shorten(label, _WIDTH)) for label in component.family.labels]
+    where = f"held in {mark(mode_name(family, why.mode))}" if len(family.modes) > 1 else "held constant"
+    if why.kind == CLOSED_SET:
+        without = " and its optional edges off" if family.modes[why.mode].optional.any() else ""
+        group = [names[v] for v in why.nodes]
+        if len(group) == 1:
+            return f"{where}{without}, {group[0]} hears nobody else and keeps its value"
+        return f"{where}{without}, {_listed(group)} hear nobody else and stay at {_camps(group, why.camps)}"
+    if why.kind == TWO_COMPONENTS:
+        first, second = (names[v] for v in why.nodes)
+        return f"{where}, the leader groups of {first} and {second} do not hear each other, and do not meet"
+    if why.kind == NO_CAMPS:
+        steps = list(dict.fromkeys(f"{names[source]} -> {names[target]}" for source, target in why.cycle))
+        if len(steps) == 1:
+            return f"{steps[0]} has both signs, so that no camps keep it"
+        return f"the signs of {_first(steps, _STEPS)} multiply to -1, so that no camps keep them"
+    if why.kind == DIFFERENT:
+        return _different(component, why, mark)
+    if why.kind == STABLE:
+        off = [_edge(family.modes[why.mode], edge, names) for edge in why.off]
+        states_of_edges = f"with {_listed(off)} off and every other edge on" if off else "with every edge on"
+        mode = mark(mode_name(family, why.mode))
+        return f"{mode if len(family.modes) > 1 else 'the graph'} {states_of_edges} is stable: all its agents end at 0"
+    return _moving(family, names, why, mark)
+
+
+def mode_name(family: Family, number: int) -> str:
+    """Return what a mode is called.
+
+    Examples
+    --------
+    >>> mode_name(Family.from_intervals([("a", "b", 1, 2)]), 0)
+    'the graph'
+    """
+    return shorten(family.modes[number].name or (f"mode {number + 1}" if len(family.modes) > 1 else "the graph"), 40)
+
+
+def _different(component: FamilyComponent, why: Counterexample, mark: Callable[[str], str]) -> str:
+    """Tell how many leader groups keep values in one mode and in another."""
+    counts = [
+        sum(c.balanced for c in component.structures[number].closed_components) for number in (why.mode, why.other)
+    ]
+    first, second = (mark(mode_name(component.family, number)) for number in (why.mode, why.other))
+    groups = f"{counts[0]} leader group{'s keep values' if counts[0] > 1 else ' keeps its value'} in {first}"
+    return f"{groups}, {counts[1]} in {second}" if counts[1] else f"{groups}, none in {second} (every agent ends at 0)"
+
+
+def _moving(family: Family, names: Sequence[str], why: Counterexample, mark: Callable[[str], str]) -> str:
+    """Tell which state is at rest in one member and moves in another."""
+    modes = (f"in {mark(mode_name(family, number))} " for number in (why.mode, why.other))
+    first, second = modes if len(family.modes) > 1 else ("", "")
+    if why.edge is not None:
+        optional = family.modes[why.other].optional[why.edge]
+        second += f"with {_edge(family.modes[why.other], why.edge, names)} {'on' if optional else 'at its largest'}"
+        if why.mode == why.other:
+            first += "at the least weights "
+    if why.state is not None:
+        size = max(map(abs, why.state)) or Fraction(1)
+        values = [f"{name}={_number(x / size)}" for name, x in zip(names[:_LISTED], why.state, strict=False)]
+        for listed in range(len(values), 0, -1):
+            state = values[:listed] if listed == len(names) else [*values[:listed], "..."]
+            sentence = f"the state {', '.join(state)} rests {first}and moves {second}".rstrip()
+            if len(unlabelled(sentence)) <= _SENTENCE:
+                return sentence
+    group = "" if why.column is None else f" at the camps of leader group {why.column + 1}"
+    return f"a state{group} rests {first}and moves {second}".rstrip()
+
+
+def _number(x: Fraction) -> str:
+    short = abs(x.numerator) < 1000 and x.denominator < 1000
+    return str(x) if short else f"{nearest_float(x):.4g}"
+
+
+def _edge(mode: Mode, edge: int, names: Sequence[str]) -> str:
+    return f"{names[mode.source[edge]]} -> {names[mode.target[edge]]}"
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _LISTED:,} more" if len(names) > _LISTED else ""
+    return ", ".join(names[:_LISTED]) + more
+
+
+def _first(names: Sequence[str], count: int) -> str:
+    return ", ".join(names if len(names) <= count else (*names[:count], "..."))
+
+
+def _camps(names: Sequence[str], camps: Sequence[int]) -> str:
+    signs = [f"{name}={sign}" for name, sign in zip(names[:_LISTED], camps, strict=False)]
+    return ", ".join(signs if len(names) <= _LISTED else (*signs, "..."))
+
+
+def last_mode_behaviours(component: FamilyComponent) -> tuple[str | None, ...]:
+    """Return what each mode does to all agents of a component if it acts for ever, its weights still changing.
+
+    None for a mode that has uncertain weights and neither brings all agents to 0 nor to one value up to camps: where
+    its weights move on, its agents need not come to rest.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.family import Family
+    >>> from ptcc_certify.theorems.family_behaviour import decide
+    >>> day, outage = SignedDigraph.from_edges([("a", "b", 1)]), SignedDigraph.from_edges([], nodes="ab")
+    >>> last_mode_behaviours(decide(Family.switching([day, outage]))[0])
+    ('bipartite consensus', 'bipartite containment')
+    """
+    result: list[str | None] = []
+    for mode, structure in zip(component.family.modes, component.structures, strict=True):
+        closed = structure.closed_components
+        camps_fit = not find_camps(component.family.n_nodes, mode.source, mode.target, mode.sign)[1].size
+        if not any(c.balanced for c in closed):
+            result.append(STABILITY)
+        elif len(closed) == 1 and camps_fit:
+            result.append(BIPARTITE_CONSENSUS)
+        elif not mode.known.all():
+            result.append(None)
+        else:
+            result.append(INTERVAL_BIPARTITE_CONSENSUS if len(closed) == 1 else BIPARTITE_CONTAINMENT)
+    return tuple(result)
+
+
+def last_mode_shows(own: str | None, behaviour: str, positive: bool = False) -> bool | None:
+    """Tell whether a mode that does ``own`` shows a behaviour, special cases included; None if that is not known.
+
+    Consensus and containment are bipartite ones without negative edges.
+
+    Parameters
+    ----------
+    own : str or None
+        One of :func:`last_mode_behaviours`.
+    behaviour : str
+    positive : bool
+        Whether all edges by which they do it are positive.
+
+    Examples
+    --------
+    >>> last_mode_shows("bipartite consensus", "bipartite containment"), last_mode_shows("stability", "consensus")
+    (True, False)
+    >>> last_mode_shows("bipartite consensus", "consensus", positive=True)
+    True
+    """
+    if own is None:
+        return None
+    general = GENERAL.get(behaviour, behaviour)
+    if general not in (CHAIN[CHAIN.index(own) :] if own in CHAIN else (own,)):
+        return False
+    if behaviour not in GENERAL or (positive and behaviour != SIGNED_AVERAGE_CONSENSUS):
+        return True
+    return False if behaviour == CONSENSUS else None

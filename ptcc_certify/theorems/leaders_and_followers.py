@@ -19,22 +19,21 @@ import lmi
 from lmi.definiteness_proofs import prove_generalized_margin, prove_margin, prove_positive_definite
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import ClosedComponent, Structure
-from ptcc_certify.lyapunov.function import LyapunovBlock, LyapunovFunction, Matrix
+from ptcc_certify.lyapunov.function import LyapunovBlock, LyapunovFunction
 from ptcc_certify.theorems.lemmas import (
     EXACT_NODES,
+    Matrix,
     algebraic_connectivity,
-    exact_left_vector,
-    left_vector,
-    unbalanced_diagonal,
-)
-from ptcc_certify.theorems.matrix_arithmetic import (
     congruence,
     diagonal_matrix,
     exact_block,
+    exact_left_vector,
     float_block,
     floats,
+    left_vector,
     rounded,
     symmetric_product,
+    unbalanced_diagonal,
     without_last,
 )
 from ptcc_certify.theorems.theorem import CONSTANT, ExactInterval, Obligation, RateProof, Theorem

@@ -1,4 +1,4 @@
-"""The lemmas of the paper as functions, one each; the theorems and the final state are built from them.
+"""The lemmas of the paper as functions, one each, and the arithmetic of matrices that theorems and final states need.
 
 Lemma 4 is :func:`lmi.h_matrix_lyapunov`, Lemma 5 :func:`lmi.schur_positive_definite` and Lemma 6
 :func:`ptcc_certify.model.gain.prescribed_time_bound`; the others are here. Lemma 7.1 is Lemma 9.1 for one closed
@@ -8,21 +8,28 @@ component, Lemma 8 the same for Lemma 9.2.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 import lmi
+from lmi.dyadic import round_to_bits
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs import size_limits as limits
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.graphs.structure import Structure, analyse
 
+if TYPE_CHECKING:
+    import flint
+
+
+#: A matrix of rationals, as lists of rows.
+Matrix = list[list[Fraction]]
 EXACT_NODES, DENSE_NODES, FACTOR_NODES = limits.EXACT_NODES, limits.DENSE_NODES, limits.FACTOR_NODES
 #: Eigenvalues nearest to 0 that are computed, products spent on an inverse, and restarts of Arnoldi's method.
 _NEAREST, _PRODUCTS, _RESTARTS = 8, 2000, 50
@@ -534,3 +541,74 @@ def solve_exact(A: Sequence[Sequence[Fraction]], B: Sequence[Sequence[Fraction]]
     except ZeroDivisionError:
         return None
     return [[Fraction(int(x.p), int(x.q)) for x in row] for row in X.tolist()]
+
+
+#: Significant bits to which the search's floats are rounded before anything is proved about them.
+BITS = 40
+
+
+def float_block(L: np.ndarray, rows: Iterable[int], columns: Iterable[int]) -> np.ndarray:
+    """Return ``L[rows][:, columns]``, either possibly empty."""
+    return L[np.ix_(np.array([*rows], dtype=int), np.array([*columns], dtype=int))]
+
+
+def floats(values: Iterable[Fraction]) -> np.ndarray:
+    """Return rationals as a float64 array."""
+    return np.array([float(v) for v in values])
+
+
+def rounded(values: Iterable[float], bits: int = BITS) -> tuple[Fraction, ...]:
+    """Round positive floats to short dyadic rationals."""
+    return tuple(round_to_bits(float(v), bits) for v in values)
+
+
+def exact_block(L: Matrix, rows: Iterable[int], columns: Iterable[int]) -> Matrix:
+    """Return ``L[rows][:, columns]``."""
+    columns = list(columns)
+    return [[L[i][j] for j in columns] for i in rows]
+
+
+def diagonal_matrix(weights: Iterable[Fraction]) -> Matrix:
+    """Return ``diag(weights)``."""
+    w = list(weights)
+    return [[w[i] if i == j else Fraction(0) for j in range(len(w))] for i in range(len(w))]
+
+
+def symmetric_product(weights: Iterable[Fraction], A: Matrix) -> Matrix:
+    """Return ``Omega A + A' Omega`` with ``Omega = diag(weights)``."""
+    w = list(weights)
+    n, zero = len(A), Fraction(0)
+    return [
+        [w[i] * A[i][j] + w[j] * A[j][i] if A[i][j] or A[j][i] else zero for j in range(n)]  # many are
+        for i in range(n)
+    ]
+
+
+def multiply(A: Matrix, B: Matrix) -> Matrix:
+    """Return ``A B``, formed in integers over common denominators."""
+    (left, a), (right, b) = integer_matrix(A), integer_matrix(B)
+    return [[Fraction(x, a * b) for x in row] for row in integer_rows(left * right)]
+
+
+def congruence(A: Matrix, S: Matrix) -> Matrix:
+    """Return ``A' S A``."""
+    return multiply([list(column) for column in zip(*A, strict=True)], multiply(S, A))
+
+
+def integer_matrix(M: Sequence[Sequence[Fraction]]) -> tuple[flint.fmpz_mat, int]:
+    """Return a rational matrix as integers over its common denominator, and that."""
+    import flint
+
+    scale = math.lcm(*{x.denominator for row in M for x in row})
+    whole = [[x.numerator * (scale // x.denominator) for x in row] for row in M]
+    return flint.fmpz_mat(len(M), len(M[0]) if M else 0, [x for row in whole for x in row]), scale
+
+
+def integer_rows(M: flint.fmpz_mat) -> list[list[int]]:
+    """Return the rows of an integer matrix."""
+    return [[int(x) for x in row] for row in M.tolist()]
+
+
+def without_last(S: Matrix) -> Matrix:
+    """Delete the last row and column: the quadratic form modulo a kernel vector whose last entry is not zero."""
+    return [row[:-1] for row in S[:-1]]

@@ -12,7 +12,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovBlock, LyapunovFunction
 from ptcc_certify.theorems.leaders_and_followers import Composite, connectivity_rate, left_vector_diagonal
-from ptcc_certify.theorems.matrix_arithmetic import floats, multiply, without_last
+from ptcc_certify.theorems.lemmas import floats, multiply, without_last
 from ptcc_certify.theorems.theorem import CONSTANT, Obligation, RateProof, Theorem
 
 

@@ -17,10 +17,9 @@ from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.model import Protocol
 from ptcc_certify.theorems.claims import sliding_number
-from ptcc_certify.theorems.quasi_strong import BalancedQuasiStrong, UnbalancedQuasiStrong
 from ptcc_certify.theorems.strong import BalancedStrong, UnbalancedStrong
 from ptcc_certify.theorems.theorem import Theorem
-from ptcc_certify.theorems.weak import BalancedWeak, UnbalancedWeak
+from ptcc_certify.theorems.weak import BalancedQuasiStrong, BalancedWeak, UnbalancedQuasiStrong, UnbalancedWeak
 
 
 def _sliding_mode(nominal: Theorem) -> Theorem:

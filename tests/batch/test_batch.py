@@ -33,7 +33,7 @@ from lmi.child_process import apart
 from ptcc_certify import Ensemble, NominalProtocol, SignedDigraph, analyse, batch, certify, certify_many
 from ptcc_certify.batch import COLUMNS, Row, backends, table_bytes
 from ptcc_certify.batch import rows as rows_module
-from ptcc_certify.batch.settings import Settings
+from ptcc_certify.batch.sources import Settings
 from ptcc_certify.errors import FormatError, GraphError, ParameterError, PTCCError
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.ensembles import CONNECTIVITIES

@@ -21,8 +21,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.asks import Asks, Expectations
-from ptcc_certify.model.late_messages import LateMessages
-from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 from ptcc_certify.simulation.late_messages import simulate_late
 from ptcc_certify.simulation.moving_leaders import simulate_tracking
 

@@ -31,9 +31,7 @@ from ptcc_certify.graphs.io import random_states, read_graph
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.lyapunov import search as search_functions
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.asks import Asks, GainLimits, InitialState
 
 NOMINAL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 SLIDING = SlidingModeProtocol(T_r="0.5", T_s="0.5", rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)

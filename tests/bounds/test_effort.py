@@ -31,10 +31,8 @@ from ptcc_certify.examples import EXAMPLES, GRAPHS, load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.asks import Asks, GainLimits, InitialState
 from ptcc_certify.model.disturbance import as_disturbance
-from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.simulation.nominal import Bounded
 from ptcc_certify.simulation.run import simulate

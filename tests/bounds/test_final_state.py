@@ -27,8 +27,7 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.asks import Asks, InitialState
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
 

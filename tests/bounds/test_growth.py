@@ -24,8 +24,7 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.late_messages import LateMessages
-from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 from ptcc_certify.simulation.moving_leaders import simulate_tracking
 
 F = Fraction

@@ -14,7 +14,7 @@ from row_families import laplacian, random_interval, random_led, random_vertex
 from scipy.linalg import expm
 
 from ptcc_certify import NominalProtocol
-from ptcc_certify.bounds.final_state.kept_means import leading_groups
+from ptcc_certify.bounds.final_state.constant_weights import leading_groups
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_proof import ComponentProof
 from ptcc_certify.checker import check, digest

@@ -24,10 +24,8 @@ from ptcc_certify.graphs.family import Family, pairs_of
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.lyapunov.follower_rows import FollowerRows
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.model.asks import Asks, Expectations
-from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.late_messages import LateMessages
-from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.asks import Asks, Expectations, GainLimits
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.report_file import write_report
 from ptcc_certify.report.statement import report_latex

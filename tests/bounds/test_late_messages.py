@@ -22,11 +22,11 @@ from selection import thinned
 from lmi.errors import NoCertificate
 from ptcc_certify.bounds.delay import decay_by_rows
 from ptcc_certify.bounds.delay.case import LateCase
+from ptcc_certify.bounds.delay.certain_misses import levels
 from ptcc_certify.bounds.delay.decay_by_rows import drift_integral
 from ptcc_certify.bounds.delay.late_messages import LateBounds, bound_late
 from ptcc_certify.bounds.delay.longest_delay import bound_at, bound_case, longest_delay
 from ptcc_certify.bounds.delay.small_delays import delay_threshold
-from ptcc_certify.bounds.delay.staged_deadlines import levels
 from ptcc_certify.bounds.final_state.of_graph import final_state
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.certification import certify
@@ -36,10 +36,8 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.lyapunov.follower_rows import FollowerRows
 from ptcc_certify.model import NominalProtocol
-from ptcc_certify.model.asks import Asks, Expectations
-from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.late_messages import LateMessages
-from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.asks import Asks, Expectations, GainLimits
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 from ptcc_certify.simulation.late_messages import PATTERNS, simulate_late
 from ptcc_certify.simulation.moving_leaders import simulate_tracking
 from ptcc_certify.simulation.run import simulate
@@ -782,7 +780,7 @@ def test_late_messages_and_leaders_that_move_are_saved_and_read() -> None:
 
 
 def test_late_messages_and_leaders_of_which_nothing_is_proved_are_read_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("ptcc_certify.certificate.messages_part.bound_late", _nothing)
+    monkeypatch.setattr("ptcc_certify.certificate.certification.bound_late", _nothing)
     graph, leaders = SignedDigraph.from_edges([("a", "b", 1)]), MovingLeaders("1/2")
     protocol, messages = NominalProtocol(T=1, rho1=1, rho2=3, kappa=1), LateMessages("0.03")
     made = certify(

@@ -24,11 +24,8 @@ from ptcc_certify.errors import Change, ParameterError, spell
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.agents import Agents
-from ptcc_certify.model.asks import Asks, Expectations
-from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.initial_state import InitialState
-from ptcc_certify.model.late_messages import LateMessages
-from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.asks import Asks, Expectations, GainLimits, InitialState
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 from ptcc_certify.report.screen import summary_lines
 
 TEAM = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("c", "a", -1), ("c", "d", 1), ("d", "c", 1)])

@@ -30,8 +30,8 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.agents import Agents
+from ptcc_certify.model.agents_protocol import CascadeProtocol
 from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.cascade import CascadeProtocol
 
 F = Fraction
 CLASSES = all_classes()

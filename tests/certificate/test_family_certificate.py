@@ -19,7 +19,7 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov import common_form_search
 from ptcc_certify.lyapunov.common_form_search import prove_certificate
-from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.common_forms import Quotient
 from ptcc_certify.report.screen import certificate_lines, summary_lines
 from ptcc_certify.theorems.family_behaviour import decide
 

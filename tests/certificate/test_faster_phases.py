@@ -21,8 +21,7 @@ from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.model import NominalProtocol
 from ptcc_certify.model.agents import Agents
-from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.asks import Asks, InitialState
 
 F = Fraction
 TEAM = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -2), ("c", "a", "-1/2"), ("c", "f", -1), ("a", "f", 2)])

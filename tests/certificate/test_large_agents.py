@@ -27,8 +27,7 @@ from ptcc_certify.checker.reading import interval
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.model import NominalProtocol
 from ptcc_certify.model.agents import Agents
-from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.asks import Asks, InitialState
 
 F = Fraction
 STRONG = NominalProtocol(T=2, rho1="0.5", rho2=3, kappa=1)

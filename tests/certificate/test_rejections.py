@@ -30,7 +30,7 @@ from ptcc_certify.bounds.delay import certain_misses
 from ptcc_certify.bounds.delay.certain_misses import Missed
 from ptcc_certify.certificate import document
 from ptcc_certify.certificate.assessment import Answer, standing
-from ptcc_certify.certificate.certificate_file import RejectedCertificate
+from ptcc_certify.certificate.certificate import RejectedCertificate
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.final_state import WIDEST
 from ptcc_certify.graphs.structure import analyse

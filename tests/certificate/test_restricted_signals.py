@@ -28,9 +28,8 @@ from ptcc_certify.certificate.constrained_switching.claims import LastModeClaim,
 from ptcc_certify.certificate.verdict import assess
 from ptcc_certify.checker import check, digest
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.lyapunov.clock_shares import search_share_form
-from ptcc_certify.lyapunov.common_forms import CommonForm
-from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.common_forms import CommonForm, Quotient
+from ptcc_certify.lyapunov.mode_forms import search_share_form
 from ptcc_certify.model.asks import Expectations
 from ptcc_certify.model.constrained_switching import ClockShares, DwellTime, JointWindows
 from ptcc_certify.report.facts.constrained_switching import signal_facts

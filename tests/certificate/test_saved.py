@@ -20,8 +20,7 @@ import ptcc_certify as ptcc
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.bounds.input.effort import effort_section
 from ptcc_certify.certificate import section_io as vectors
-from ptcc_certify.certificate.certificate import Certificate, read_certificate
-from ptcc_certify.certificate.certificate_file import RejectedCertificate
+from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate, read_certificate
 from ptcc_certify.certificate.graph_sections import structure_document
 from ptcc_certify.certificate.section_io import Writer, write
 from ptcc_certify.checker import digest

@@ -26,9 +26,8 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import load_graph, select
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.asks import Asks, InitialState
 from ptcc_certify.model.disturbance import SampledDisturbance, StateDependent, telegraph_noise
-from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import Trajectory

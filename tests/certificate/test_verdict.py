@@ -34,8 +34,7 @@ from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.usefulness import LAST
 from ptcc_certify.errors import Change
 from ptcc_certify.examples import load_graph
-from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.asks import Asks, InitialState
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.report.statement import report_latex

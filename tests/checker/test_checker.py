@@ -55,9 +55,7 @@ from ptcc_certify.examples import load_graph, select
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import read_graph
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.asks import Asks, GainLimits, InitialState
 from ptcc_certify.model.late_messages import LateMessages
 
 CLASSES = dict(all_classes())

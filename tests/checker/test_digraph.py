@@ -26,7 +26,7 @@ from ptcc_certify.checker.reading import RejectedError
 from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.nominal import NominalProtocol
+from ptcc_certify.model.base import NominalProtocol
 
 KINDS = (Digraph, ArrayDigraph)
 

@@ -42,8 +42,7 @@ from selection import thinned
 
 from ptcc_certify import checker
 from ptcc_certify.certificate import section_io
-from ptcc_certify.certificate.certificate import read_certificate
-from ptcc_certify.certificate.certificate_file import RejectedCertificate
+from ptcc_certify.certificate.certificate import RejectedCertificate, read_certificate
 from ptcc_certify.certificate.document import certificate_document
 from ptcc_certify.certificate.family_proof import ComponentProof
 from ptcc_certify.checker import check

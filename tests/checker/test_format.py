@@ -33,8 +33,7 @@ from ptcc_certify.checker.contents import BRINGS
 from ptcc_certify.checker.reading import RejectedError, exact
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.asks import Asks, InitialState
 
 FOLDER = Path(checker.__file__).parent
 FORMAT = (FOLDER / "FORMAT.md").read_text(encoding="utf-8")

@@ -26,7 +26,7 @@ from true_certificates import cases, made
 
 from ptcc_certify.checker import check
 from ptcc_certify.checker import graph as checked_graph
-from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.asks import GainLimits
 
 # ---------------------------------------------------------------------- mutations
 

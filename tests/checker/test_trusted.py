@@ -23,8 +23,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.model import NominalProtocol
 from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.late_messages import LateMessages
-from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 
 ROOT = Path(ptcc_certify.__file__).parents[1]
 LISTED = (ROOT / "ptcc_certify/checker/TRUSTED").read_text(encoding="utf-8").splitlines()

@@ -26,11 +26,8 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.agents import Agents
-from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.initial_state import InitialState
-from ptcc_certify.model.late_messages import LateMessages
-from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.asks import Asks, GainLimits, InitialState
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 from ptcc_certify.model.virtual_positions import TrackingProtocol
 from ptcc_certify.model.virtual_positions import Vehicles as Team
 from ptcc_certify.simulation.late_messages import simulate_late

@@ -20,7 +20,7 @@ import ptcc_certify
 from ptcc_certify.cli import cli
 from ptcc_certify.cli.click_options import DECLARED, OF_PROTOCOL, TITLES, given_of, options_for
 from ptcc_certify.graphs.declared_option import option, options_of
-from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.late_messages import MovingLeaders
 from ptcc_certify.model.parameters import Given
 
 pytestmark = pytest.mark.usefixtures("quick_search")

@@ -128,7 +128,7 @@ def test_the_delay_up_to_which_a_wanted_residual_is_told_to_be_certified_is_cert
 def test_no_delay_is_told_that_the_check_does_not_accept(monkeypatch: pytest.MonkeyPatch) -> None:
     words = ("team.csv", "--delay", "0.02", "--max-residual", "0.001", *START, *QUICK)
     monkeypatch.setattr(
-        "ptcc_certify.certificate.messages_part.longest_delay",
+        "ptcc_certify.certificate.certification.longest_delay",
         lambda late, _: replace(late, residual=np.zeros(4), case=replace(late.case, messages=LateMessages("0.01"))),
     )
     assert "older" not in ptcc("certify", *words).out

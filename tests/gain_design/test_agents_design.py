@@ -12,18 +12,16 @@ import pytest
 from generators import all_classes, random_graph
 from scipy.optimize import linprog
 
-from ptcc_certify.bounds.agents.shortest_time import shortest_time
 from ptcc_certify.certificate.certification import certify
 from ptcc_certify.checker import check
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.gain_design import deadline_search
 from ptcc_certify.gain_design.answer import INFEASIBLE, MET, UNPROVED, AgentsDesign
-from ptcc_certify.gain_design.deadline_search import TOLERANCE, Candidate, at_deadline, design_agents
+from ptcc_certify.gain_design.deadline_search import TOLERANCE, Candidate, at_deadline, design_agents, shortest_time
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.agents import Agents
-from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.asks import Asks, InitialState
 
 TRIO = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 2), ("a", "c", -1), ("c", "a", -1)])
 PLACES = {"a": [0, 0], "b": [1, 0], "c": [0, 1]}

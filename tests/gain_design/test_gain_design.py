@@ -20,13 +20,12 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import GRAPHS, load_graph
 from ptcc_certify.gain_design import search
 from ptcc_certify.gain_design.answer import INFEASIBLE, MET, UNPROVED
-from ptcc_certify.gain_design.gain_candidates import Option, least_peak, peak_factor
 from ptcc_certify.gain_design.request import input_bounds
-from ptcc_certify.gain_design.search import _at, design
+from ptcc_certify.gain_design.search import Option, _at, design, least_peak, peak_factor
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import read_graph
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.asks import GainLimits
 from ptcc_certify.simulation.run import simulate
 
 PAIR = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])

@@ -21,8 +21,7 @@ from ptcc_certify import GainLimits, NominalProtocol, SlidingModeProtocol, certi
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.examples import load_graph
 from ptcc_certify.gain_design.search import design
-from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.asks import Asks, InitialState
 from ptcc_certify.model.reaching_time import ReachingTime
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.screen import certificate_lines

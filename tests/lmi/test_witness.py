@@ -22,7 +22,6 @@ def test_all_proofs_agree_with_the_minors(seed, n, shift, missing_rank):
     S = gram(rng, n, max(n - missing_rank, 1)) + shift * np.eye(n, dtype=int)
     truth = minors_positive(S.tolist())
     assert bool(lmi.prove_positive_definite(S)) == truth
-    assert lmi.definite_by_polynomial(S.tolist()) == truth
     assert (eliminate(S.tolist()) is None) == truth
     assert PLAIN.definite(S.tolist()) == FAST.definite(S.tolist()) == truth
     assert factored(S.tolist()) <= truth
@@ -43,16 +42,6 @@ def test_a_singular_matrix_shifted_either_way(seed, n, sign):
     assert FAST.definite(rows) is PLAIN.definite(rows) is truth
     assert (proof.witness is not None) is truth
     assert not truth or proof.witness.proves(S)
-
-
-def test_the_polynomial_is_a_second_opinion_up_to_forty_rows():
-    rng = np.random.default_rng(7)
-    S = gram(rng, 40, 39)
-    assert not lmi.definite_by_polynomial(S.tolist())
-    assert lmi.definite_by_polynomial((S + np.eye(40, dtype=int)).tolist())
-    assert lmi.definite_by_polynomial([])
-    with pytest.raises(lmi.MatrixError, match="symmetric"):
-        lmi.definite_by_polynomial([[2, 1], [0, 2]])
 
 
 @pytest.mark.parametrize("n", [30, 200])

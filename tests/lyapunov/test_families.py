@@ -20,11 +20,14 @@ from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov import common_form_search
-from ptcc_certify.lyapunov.common_form_search import search_common_forms
-from ptcc_certify.lyapunov.common_forms import CommonForm, decay_matrices, prove_mode
-from ptcc_certify.lyapunov.common_left_vector import common_left_vector, undirected_function
-from ptcc_certify.lyapunov.forms_for_one_state import Aim, aimed_functions
-from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.common_form_search import (
+    Aim,
+    aimed_functions,
+    common_left_vector,
+    search_common_forms,
+    undirected_function,
+)
+from ptcc_certify.lyapunov.common_forms import CommonForm, Quotient, decay_matrices, prove_mode
 from ptcc_certify.lyapunov.slow_signals import (
     SignalRateBound,
     prove_candidate,

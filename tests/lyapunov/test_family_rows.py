@@ -12,16 +12,16 @@ from row_families import bounds_of, laplacian, random_followers, random_led, ran
 from scipy.linalg import expm
 
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.lyapunov.common_left_vector import common_left_vector
-from ptcc_certify.lyapunov.follower_function import follower_functions
-from ptcc_certify.lyapunov.interval_rows import IntervalRows
-from ptcc_certify.lyapunov.row_decay import (
+from ptcc_certify.lyapunov.common_form_search import common_left_vector
+from ptcc_certify.lyapunov.follower_function import (
     FollowerDecay,
     follower_decay,
+    follower_functions,
     follower_nodes,
     least_rate,
     prove_follower_decay,
 )
+from ptcc_certify.lyapunov.follower_rows import IntervalRows
 from ptcc_certify.theorems.family_behaviour import decide
 
 KINDS = ("stability", "bipartite consensus", "bipartite containment")

@@ -18,8 +18,7 @@ from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.lyapunov.error_system import ErrorSystem
 from ptcc_certify.lyapunov.function import root_above
 from ptcc_certify.lyapunov.search import LARGEST_OVERSHOOT, Candidate, choose, prove_function, search_functions
-from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.asks import Asks, InitialState
 
 P = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 CLOCKS = [float(P.gain.clock_at_remaining(1 - fraction)) for fraction in FRACTIONS]

@@ -135,7 +135,7 @@ def test_parameters_are_exact_and_frozen():
 
 def test_importing_the_modules_loads_neither_casadi_nor_scipy():
     code = (
-        "import sys, ptcc_certify.model.gain, ptcc_certify.model.nominal, ptcc_certify.simulation.run;"
+        "import sys, ptcc_certify.model.gain, ptcc_certify.model.base, ptcc_certify.simulation.run;"
         "import ptcc_certify.model.casadi_latex;"
         "sys.exit(bool({'casadi', 'scipy', 'networkx', 'matplotlib'} & set(sys.modules)))"
     )

@@ -28,7 +28,7 @@ from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.io.packaged import GRAPHS
 from ptcc_certify.graphs.size_limits import EXPLORED_NODES
 from ptcc_certify.report.explorer import GIVEN, Explorer, Settings, View, explore, model, widgets
-from ptcc_certify.report.explorer.question import reading_of
+from ptcc_certify.report.explorer.model import reading_of
 from ptcc_certify.report.explorer.widgets import controls
 
 pytestmark = pytest.mark.usefixtures("quick_search")

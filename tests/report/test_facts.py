@@ -16,7 +16,7 @@ import ptcc_certify as ptcc
 from lmi.exact.decimal_rounding import down, up
 from ptcc_certify.cli.terminal import flagged
 from ptcc_certify.errors import Change, ParameterError, spell
-from ptcc_certify.report.facts.beside_law import beside_law
+from ptcc_certify.report.facts.late import beside_law
 from ptcc_certify.report.page import set_note
 from ptcc_certify.report.screen import SECTIONS, certificate_lines, summary_lines
 

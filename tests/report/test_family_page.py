@@ -22,9 +22,8 @@ from ptcc_certify import (
 )
 from ptcc_certify.errors import ParameterError, unlabelled
 from ptcc_certify.graphs.io import as_family
-from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.asks import Asks, InitialState
 from ptcc_certify.model.constrained_switching import ClockShares, DwellTime, JointWindows
-from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.report.facts.claim import groups_text
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.decay import plot_decay

@@ -22,11 +22,10 @@ from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.model.asks import Expectations
 from ptcc_certify.model.constrained_switching import DwellTime
 from ptcc_certify.report.facts.claim import groups_text
-from ptcc_certify.report.facts.of_structure import decision_facts
+from ptcc_certify.report.facts.graph import decision_facts
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.screen import certificate_lines, long_screen, short_screen, summary_lines
-from ptcc_certify.theorems.counterexample_text import counterexample_text
-from ptcc_certify.theorems.family_behaviour import FamilyComponent
+from ptcc_certify.theorems.family_behaviour import FamilyComponent, counterexample_text
 
 pytestmark = pytest.mark.usefixtures("framed_figures", "quick_search")
 

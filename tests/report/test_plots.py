@@ -40,13 +40,9 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.packed_weights import Weights
 from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
-from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.gain_limits import GainLimits
-from ptcc_certify.model.initial_state import InitialState
-from ptcc_certify.model.late_messages import LateMessages
-from ptcc_certify.model.moving_leaders import MovingLeaders
-from ptcc_certify.model.nominal import NominalProtocol
-from ptcc_certify.model.sliding_mode import SlidingModeProtocol
+from ptcc_certify.model.asks import Asks, GainLimits, InitialState
+from ptcc_certify.model.base import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 from ptcc_certify.report.notebook import trajectory_html
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.camp_lines import (
@@ -66,13 +62,12 @@ from ptcc_certify.report.plots.glance import plot_glance
 from ptcc_certify.report.plots.graph import GROUND, plot_graph, weight_ranges
 from ptcc_certify.report.plots.graph_layout import FREE_NODES, arc
 from ptcc_certify.report.plots.input import plot_effort, plot_input
-from ptcc_certify.report.plots.motion import plot_formation, plot_motion
 from ptcc_certify.report.plots.sizes import DOUBLE_COLUMN, SINGLE_COLUMN, figures_for
 from ptcc_certify.report.plots.spectrum import CLASS_MARKERS, plot_frontier, plot_spectrum
 from ptcc_certify.report.plots.style import BEHIND, BOUND, EDGE_STYLES, STYLE, save_figure
 from ptcc_certify.report.plots.tracking import plot_tracking
 from ptcc_certify.report.plots.trade_off import plot_trade_off
-from ptcc_certify.report.plots.trajectory import plot_run, plot_sliding, plot_trajectory
+from ptcc_certify.report.plots.trajectory import plot_formation, plot_motion, plot_run, plot_sliding, plot_trajectory
 from ptcc_certify.report.report_file import write_report
 from ptcc_certify.simulation.nominal import Bounded
 from ptcc_certify.simulation.run import simulate

@@ -14,7 +14,7 @@ import ptcc_certify as ptcc
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import published
 from ptcc_certify.examples.published import PUBLISHED, select_published
-from ptcc_certify.report.published_results import PUBLISHED_HEAD, Found, certify_published
+from ptcc_certify.report.example_results import PUBLISHED_HEAD, Found, certify_published
 
 FOLDER = Path(published.__file__).parent
 PAGE = Path(__file__).parents[2] / "docs" / "gallery" / "published.md"

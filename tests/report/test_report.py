@@ -46,13 +46,11 @@ from ptcc_certify import (
     certify,
     design,
 )
-from ptcc_certify.certificate.certificate import read_certificate
-from ptcc_certify.certificate.certificate_file import RejectedCertificate
+from ptcc_certify.certificate.certificate import RejectedCertificate, read_certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.io import read_graph
-from ptcc_certify.model.asks import Asks
-from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.asks import Asks, InitialState
 from ptcc_certify.report.html_text import LISTED, formula_svg, printable, set_text, typeset
 from ptcc_certify.report.latex_text import latex_of_text
 from ptcc_certify.report.page import _environment, report_html

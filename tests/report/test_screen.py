@@ -24,10 +24,9 @@ from ptcc_certify.errors import ExitCode, UnknownAgentError
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.model.asks import Expectations
-from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.asks import Expectations, GainLimits
 from ptcc_certify.report.facts.decay import told_instants
-from ptcc_certify.report.facts.of_structure import structure_facts
+from ptcc_certify.report.facts.graph import structure_facts
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.screen import certificate_lines, check_summary, short_screen, summary_lines
 from ptcc_certify.report.text_layout import columns, shorten_list, wrap_lines

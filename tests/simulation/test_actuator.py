@@ -18,10 +18,9 @@ from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.asks import Asks, GainLimits
 from ptcc_certify.model.disturbance import SampledDisturbance
 from ptcc_certify.model.gain import Gain
-from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.limited_gain import LimitedGain
 from ptcc_certify.simulation.nominal import Bounded, as_forcing
 from ptcc_certify.simulation.run import simulate

@@ -13,7 +13,7 @@ from ptcc_certify.errors import FormatError, ParameterError, SimulationError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.model import NominalProtocol
-from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.asks import GainLimits
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.simulation.member_laplacians import Members
 from ptcc_certify.simulation.run import simulate
@@ -202,7 +202,7 @@ def test_bad_tables_are_refused_by_line():
 
 
 def test_a_signal_that_switches_too_often_is_refused_in_time(monkeypatch):
-    monkeypatch.setattr("ptcc_certify.simulation.switched_motion.MOST_STRETCHES", 50)
+    monkeypatch.setattr("ptcc_certify.simulation.switching_signals.MOST_STRETCHES", 50)
     with pytest.raises(SimulationError, match="let each member act longer"):
         simulate(PAIR, PROTOCOL, [1, 2, 3], RandomSignal(dwell=1e-3))
 

@@ -1,6 +1,6 @@
 """What holds with late messages and moving leaders: what is left at the deadline, by every kind of proof; stages.
 
-Agents obey :mod:`ptcc_certify.model.late_messages` and :mod:`ptcc_certify.model.moving_leaders`. Followers of single
+Agents obey :mod:`ptcc_certify.model.late_messages` and :mod:`ptcc_certify.model.late_messages`. Followers of single
 leaders are bounded row by row
 (:mod:`ptcc_certify.bounds.delay.decay_by_rows`) and from instant to instant
 (:mod:`ptcc_certify.bounds.delay.decay_by_steps`), all agents by a Lyapunov function of the whole graph.
@@ -20,15 +20,13 @@ import numpy as np
 
 from lmi.errors import LMIError
 from lmi.exact.decimal_rounding import float_up, up
-from ptcc_certify.bounds.delay.case import LARGEST_EXPONENT, LateCase, asked_leaders, read_leaders
-from ptcc_certify.bounds.delay.certain_misses import Missed, find_missed
+from ptcc_certify.bounds.delay.case import LARGEST_EXPONENT, LateCase, Settling, asked_leaders, read_leaders
+from ptcc_certify.bounds.delay.certain_misses import Missed, find_missed, stage_deadlines
 from ptcc_certify.bounds.delay.decay_by_rows import LOSSES_CLIPPED, MORE, RowBound, away, search_rows
 from ptcc_certify.bounds.delay.decay_by_steps import Steps, bound_steps, search_steps
 from ptcc_certify.bounds.delay.delay_lmi import DelayLMIBound
-from ptcc_certify.bounds.delay.followers_of_groups import Settling
 from ptcc_certify.bounds.delay.forms_of_families import FamilyForm
 from ptcc_certify.bounds.delay.small_delays import SmallDelays
-from ptcc_certify.bounds.delay.staged_deadlines import stage_deadlines
 from ptcc_certify.bounds.float_conversion import floats, floats_up
 from ptcc_certify.bounds.instants import instants_from_0
 from ptcc_certify.bounds.virtual_positions import (
@@ -52,9 +50,8 @@ from ptcc_certify.graphs.family import Family, pairs_of
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
 from ptcc_certify.model.base import Protocol
-from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 from ptcc_certify.model.limited_gain import LimitedGain
-from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.virtual_positions import TrackingProtocol, Vehicles
 from ptcc_certify.theorems.theorem import Obligation
 

@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_up
-from ptcc_certify.bounds.delay.case import LateCase
+from ptcc_certify.bounds.delay.case import LateCase, SettlingBounds
 from ptcc_certify.bounds.delay.decay_by_rows import MORE
 from ptcc_certify.bounds.delay.delay_lmi import DelayLMIBounds
-from ptcc_certify.bounds.delay.followers_of_groups import SettlingBounds
 from ptcc_certify.bounds.delay.forms_of_families import forms_of_family, longest_delay_of_family, rest_of
 from ptcc_certify.bounds.delay.late_messages import LateBounds, bound_late, late_rows
 from ptcc_certify.bounds.delay.small_delays import SmallDelayBounds

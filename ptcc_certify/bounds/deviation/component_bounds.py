@@ -24,10 +24,9 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_down, float_up
-from ptcc_certify.bounds.decay import Decay
+from ptcc_certify.bounds.decay import Decay, ReachingPhase
 from ptcc_certify.bounds.deviation.heard import HeardRows
 from ptcc_certify.bounds.instants import Instants
-from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.checker.common_forms import Scaled
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.checker.signal_bounds import Drive, least

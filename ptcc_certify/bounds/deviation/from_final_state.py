@@ -29,7 +29,7 @@ from ptcc_certify.bounds.final_state.of_graph import Influence
 from ptcc_certify.bounds.input.initial_sets import ways
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import DeviationBound, LyapunovFunction
-from ptcc_certify.theorems.matrix_arithmetic import integer_matrix, integer_rows
+from ptcc_certify.theorems.lemmas import integer_matrix, integer_rows
 
 #: Bits of the constants.
 CONSTANT_BITS = 40

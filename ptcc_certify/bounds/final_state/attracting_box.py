@@ -5,7 +5,8 @@ Let the agents outside ``F`` stay in ``[l_j, u_j]`` from the beginning, and nobo
 
     sum_l |w_kl| (u_k - y_l)  >=  0        at w+ where y_l > u_k, at w- elsewhere,
 
-and the mirror image for ``-l``, and let ``d``, ``alpha`` be those of :mod:`ptcc_certify.lyapunov.row_decay`. Then
+and the mirror image for ``-l``, and let ``d``, ``alpha`` be a decay of rows,
+:mod:`ptcc_certify.lyapunov.follower_function`. Then
 
     rho = max_k max(0, (x_k - u_k) / d_k, (l_k - x_k) / d_k)    decays with e^(-alpha s) for every signal:
 
@@ -35,9 +36,8 @@ from lmi.sparse_h_matrix import solve
 from ptcc_certify.checker.constrained_switching import reachable_bounds
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float
-from ptcc_certify.graphs.structure import find_camps
-from ptcc_certify.lyapunov.interval_rows import IntervalRows, Policy, least_quotient
-from ptcc_certify.lyapunov.row_decay import FollowerDecay, follower_decays, least_rate
+from ptcc_certify.lyapunov.follower_function import FollowerDecay, follower_decays, least_rate
+from ptcc_certify.lyapunov.follower_rows import IntervalRows, least_quotient
 
 _ROUNDS = 60
 #: Binary places of the ends, against the largest of them.
@@ -62,23 +62,18 @@ class AttractingBox:
     decay : FollowerDecay
         ``nodes``, ``d`` and ``alpha``.
     lower, upper : tuple of n Fraction
-    attained : tuple of two tuples of n Fraction, or None
-        Some constant weights, with all agents outside at one of their ends, take agent ``k`` to at most the first and
-        at least the second. None where modes, weights that change together, or edges that keep no camps leave open how
-        much of the box is needed.
     """
 
     decay: FollowerDecay
     lower: tuple[Fraction, ...]
     upper: tuple[Fraction, ...]
-    attained: tuple[tuple[Fraction, ...], tuple[Fraction, ...]] | None = None
 
     def excess(self, x: Sequence[Fraction]) -> Fraction:
         """Return ``rho`` of the states of all agents; ``d`` in integers as in ``decay``.
 
         Examples
         --------
-        >>> from ptcc_certify.lyapunov.row_decay import follower_decay
+        >>> from ptcc_certify.lyapunov.follower_function import follower_decay
         >>> family = Family.from_intervals([("a", "b", 1, 2)])
         >>> box = attracting_box(family, follower_decay(family), {0: (Fraction(0), Fraction(1))})
         >>> box.upper[0] >= 1, float(box.excess([Fraction(0), box.upper[0] + 3 * int(box.decay.vector[0])]))
@@ -198,7 +193,7 @@ def attracting_box(family: Family, decay: FollowerDecay, intervals: dict[int, In
 
     Examples
     --------
-    >>> from ptcc_certify.lyapunov.row_decay import follower_decay
+    >>> from ptcc_certify.lyapunov.follower_function import follower_decay
     >>> family = Family.from_intervals([("a", "c", 1, 3), ("b", "c", 1, 1)], nodes="abc")
     >>> ends = {0: (Fraction(0), Fraction(0)), 1: (Fraction(4), Fraction(4))}
     >>> box = attracting_box(family, follower_decay(family), ends)
@@ -212,7 +207,7 @@ def attracting_box(family: Family, decay: FollowerDecay, intervals: dict[int, In
     lifted = rows.lifted()
     unit, z = _outside(intervals)
     with np.errstate(all="ignore"):
-        y, policy = _largest(lifted, z)
+        y = _largest(lifted, z)
     if least_rate(rows, d) <= 0:
         raise ValueError("the vector proves no decay of these followers")
     v = np.tile(_repair(rows, d), 2)
@@ -221,13 +216,7 @@ def attracting_box(family: Family, decay: FollowerDecay, intervals: dict[int, In
     upper = _shifted(y, v, _missing(lifted.pull(np.concatenate([y, z])), lifted.pull(v_all)))
     if not (lifted.pull(np.concatenate([upper, z * 2**_PLACES])) >= 0).all():
         raise ArithmeticError("a row of a box fails, against what was proved")
-    fine = unit / 2**_PLACES
-    box = AttractingBox(decay, *_ends(upper, fine))
-    if not _is_attained(family, rows):
-        return box
-    pull = lifted.pull_of(policy, np.concatenate([y, z]))
-    surplus = _missing(-pull, lifted.pull_of(policy, v_all))
-    return replace(box, attained=_ends(_shifted(y, v, -surplus), fine))
+    return AttractingBox(decay, *_ends(upper, unit / 2**_PLACES))
 
 
 def _ends(y: np.ndarray, unit: Fraction) -> tuple[tuple[Fraction, ...], tuple[Fraction, ...]]:
@@ -246,8 +235,8 @@ def _outside(intervals: dict[int, Interval]) -> tuple[Fraction, np.ndarray]:
     return unit, np.array([-((-x / unit).__floor__()) for x in z], dtype=object)
 
 
-def _largest(lifted: IntervalRows, z: np.ndarray) -> tuple[np.ndarray, Policy]:
-    """Return ``y`` of the fixed point of the worst weights, in integers, and these weights."""
+def _largest(lifted: IntervalRows, z: np.ndarray) -> np.ndarray:
+    """Return ``y`` of the fixed point of the worst weights, in integers."""
     ends = z.astype(float)
     top = float(np.abs(ends).max(initial=0))
     y = np.full(lifted.n, max(float(ends.max(initial=0)), 0.0))
@@ -260,7 +249,7 @@ def _largest(lifted: IntervalRows, z: np.ndarray) -> tuple[np.ndarray, Policy]:
             break
         policy = new
     y = np.where(np.isfinite(y), y, top)
-    return np.array([int(v) for v in np.rint(y).tolist()], dtype=object), policy
+    return np.array([int(v) for v in np.rint(y).tolist()], dtype=object)
 
 
 def _repair(rows: IntervalRows, d: np.ndarray) -> np.ndarray:
@@ -288,16 +277,5 @@ def _missing(pull: np.ndarray, spare: np.ndarray) -> Fraction:
 
 
 def _shifted(y: np.ndarray, v: np.ndarray, e: Fraction) -> np.ndarray:
-    """Return integers ``2^_PLACES (y + e v)``, ``e`` rounded away from 0."""
-    steps = -((-abs(e) * 2**_PLACES).__floor__())
-    return y.astype(object) * 2**_PLACES + (steps if e > 0 else -steps) * v.astype(object)
-
-
-def _is_attained(family: Family, rows: IntervalRows) -> bool:
-    """Tell whether constant weights attain the box: one mode, independent weights, camps of all edges into it."""
-    if rows.modes > 1:
-        return False
-    if family.modes[0].tied and (rows.lower != rows.upper)[rows.source < rows.n].any():
-        return False
-    _, violated, _ = find_camps(rows.n + rows.outside, rows.source, rows.target, rows.sign)
-    return violated.size == 0
+    """Return integers ``2^_PLACES (y + e v)``, ``e >= 0`` rounded up."""
+    return y.astype(object) * 2**_PLACES - (-e * 2**_PLACES).__floor__() * v.astype(object)

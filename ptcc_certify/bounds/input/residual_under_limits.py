@@ -16,8 +16,8 @@ from ptcc_certify.bounds.input.effort import Disturbed, Limited, Noise, Peak
 from ptcc_certify.bounds.input.tightest_bound import BOUND_BITS, decaying, least, log, round_up
 from ptcc_certify.checker.input_formulas import LAST_PERIODS, InputBounds, Limits, root_above, rounded
 from ptcc_certify.graphs.rationals import nearest_float
+from ptcc_certify.model.asks import GainLimits
 from ptcc_certify.model.gain import Gain
-from ptcc_certify.model.gain_limits import GainLimits
 
 #: Periods below this share of ``T`` are not searched; how often the interval of the longest one is halved, and which
 #: shares of it are proved, one after the other, until one is.

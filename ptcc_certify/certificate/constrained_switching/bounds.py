@@ -21,9 +21,8 @@ from ptcc_certify.certificate.family_proof import ComponentProof, FamilyProof
 from ptcc_certify.checker.common_forms import Scaled
 from ptcc_certify.checker.common_kernel_ends import WeightedMean
 from ptcc_certify.checker.input_formulas import root_above
-from ptcc_certify.lyapunov.common_forms import CommonForm
+from ptcc_certify.lyapunov.common_forms import CommonForm, Quotient
 from ptcc_certify.lyapunov.mode_forms import mode_functions
-from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.model.constrained_switching import DwellTime
 
 #: Longest product of the factors at all switches, in bits.

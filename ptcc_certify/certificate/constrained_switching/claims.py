@@ -13,8 +13,7 @@ from ptcc_certify.theorems.contractions import ExplicitRate
 if TYPE_CHECKING:  # classes of signals are told without the solvers
     from ptcc_certify.bounds.final_state.constant_weights import ValueEnds
     from ptcc_certify.checker.reading import Interval
-    from ptcc_certify.lyapunov.clock_shares import ShareForm
-    from ptcc_certify.lyapunov.mode_forms import ModeForms
+    from ptcc_certify.lyapunov.mode_forms import ModeForms, ShareForm
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,8 +13,7 @@ from fractions import Fraction
 from lmi.exact.elementary_enclosures import log, rounded
 from lmi.search_time import share_of_time
 from ptcc_certify.bounds.final_state.attracting_box import have_common_denominator
-from ptcc_certify.bounds.final_state.constant_weights import ValueEnds, value_ends
-from ptcc_certify.bounds.final_state.kept_means import mean_of_shares
+from ptcc_certify.bounds.final_state.constant_weights import ValueEnds, mean_of_shares, value_ends
 from ptcc_certify.certificate.constrained_switching.claims import (
     Claim,
     FinalValueClaim,
@@ -30,14 +29,18 @@ from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.rationals import writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
-from ptcc_certify.lyapunov.clock_shares import search_share_form
-from ptcc_certify.lyapunov.mode_forms import ModeForms, search_mode_forms, search_single_forms, within_reach
-from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.common_forms import Quotient
+from ptcc_certify.lyapunov.mode_forms import (
+    ModeForms,
+    search_mode_forms,
+    search_share_form,
+    search_single_forms,
+    within_reach,
+)
 from ptcc_certify.model import Protocol
 from ptcc_certify.model.constrained_switching import ClockShares, DwellTime, JointWindows, SignalClass
 from ptcc_certify.theorems.contractions import joint_behaviour, window_rate
-from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
-from ptcc_certify.theorems.last_mode import last_mode_behaviours
+from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, last_mode_behaviours
 
 STEP = "restricted signals"
 #: 1 - t/T at which switches are weighed against the rate.

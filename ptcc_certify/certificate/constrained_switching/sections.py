@@ -37,10 +37,8 @@ from ptcc_certify.checker.constrained_switching import (
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, find_camps
-from ptcc_certify.lyapunov.clock_shares import ShareForm
-from ptcc_certify.lyapunov.common_forms import CommonForm, prove_ends
-from ptcc_certify.lyapunov.mode_forms import ModeForms
-from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.common_forms import CommonForm, Quotient, prove_ends
+from ptcc_certify.lyapunov.mode_forms import ModeForms, ShareForm
 from ptcc_certify.model.constrained_switching import ClockShares, DwellTime, JointWindows, SignalClass
 from ptcc_certify.theorems.contractions import contraction
 from ptcc_certify.theorems.family_behaviour import FamilyComponent

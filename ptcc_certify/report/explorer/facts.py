@@ -9,8 +9,7 @@ from ptcc_certify.errors import Change
 from ptcc_certify.report.facts.claim import claim_facts
 from ptcc_certify.report.facts.decay import error_facts, instants_facts, rate_facts
 from ptcc_certify.report.facts.input import input_facts, threshold_facts
-from ptcc_certify.report.facts.question_and_verdict import run_facts
-from ptcc_certify.report.facts.sliding import sliding_facts
+from ptcc_certify.report.facts.of_certificate import run_facts, sliding_facts
 from ptcc_certify.report.facts.states import final_facts
 
 #: The rows, and what stands in those for which a certificate has nothing to tell.

@@ -29,8 +29,7 @@ import jinja2
 from ptcc_certify.errors import ParameterError, explain
 from ptcc_certify.lyapunov.search import METHODS
 from ptcc_certify.report.explorer.facts import HEADS
-from ptcc_certify.report.explorer.model import Explorer, View
-from ptcc_certify.report.explorer.panels import PANELS
+from ptcc_certify.report.explorer.model import PANELS, Explorer, View
 from ptcc_certify.report.explorer.settings import DISTURBANCES, KINDS, LARGEST_SEED, SLIDERS, Settings, refuse_unknown
 
 #: This machine, by the names under which its own browser may ask for the page.

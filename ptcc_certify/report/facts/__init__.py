@@ -2,5 +2,5 @@
 
 One module for each thing that can be told; each yields :class:`~ptcc_certify.certificate.fact.Fact`.
 :mod:`~ptcc_certify.report.facts.of_certificate` lists what is told of a certificate,
-:mod:`~ptcc_certify.report.facts.of_structure` what is told of graphs and designs, and loads no solver.
+:mod:`~ptcc_certify.report.facts.graph` what is told of graphs and designs, and loads no solver.
 """

@@ -22,8 +22,14 @@ from ptcc_certify.report.facts.input import without
 from ptcc_certify.report.text_layout import TEXT, agent_text, columns, interval_text, printable, shorten_list, wrap_text
 from ptcc_certify.theorems.agreeing_groups import AgreeingGroup, FamilyGroups
 from ptcc_certify.theorems.claims import Claim
-from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
-from ptcc_certify.theorems.family_behaviour import CHAIN, DEPENDS, FamilyComponent, decide
+from ptcc_certify.theorems.family_behaviour import (
+    CHAIN,
+    DEPENDS,
+    FamilyComponent,
+    counterexample_text,
+    decide,
+    mode_name,
+)
 
 if TYPE_CHECKING:
     from ptcc_certify.bounds.final_state.attracting_box import AttractingBox

@@ -20,8 +20,7 @@ from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, CONSENSUS, CONTAINMENT
 from ptcc_certify.model.constrained_switching import ClockShares, DwellTime, JointWindows, SignalClass
 from ptcc_certify.report.text_layout import agent_text, printable
-from ptcc_certify.theorems.counterexample_text import mode_name
-from ptcc_certify.theorems.family_behaviour import DEPENDS, GENERAL
+from ptcc_certify.theorems.family_behaviour import DEPENDS, GENERAL, mode_name
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate

@@ -21,7 +21,7 @@ from ptcc_certify.report.facts.constrained_switching import TINY, TOO_SMALL, eve
 from ptcc_certify.report.facts.input import limits_text, said_without
 from ptcc_certify.report.text_layout import shorten_list
 from ptcc_certify.theorems.contractions import explicit_rate
-from ptcc_certify.theorems.counterexample_text import mode_name
+from ptcc_certify.theorems.family_behaviour import mode_name
 
 if TYPE_CHECKING:
     from ptcc_certify.bounds.input.effort import Limited

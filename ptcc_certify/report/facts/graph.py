@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import PurePath
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.io.columns_beside import IGNORED
 from ptcc_certify.graphs.structure import ClosedComponent, Structure, analyse
 from ptcc_certify.graphs.stubborn import prejudices, stubbornness
+from ptcc_certify.report.facts.claim import family_claims, structure_claims
 from ptcc_certify.report.text_layout import (
     TEXT,
     agent_text,
@@ -25,8 +27,11 @@ from ptcc_certify.report.text_layout import (
     shorten_list,
     shorten_text,
 )
-from ptcc_certify.theorems.counterexample_text import mode_name
-from ptcc_certify.theorems.family_behaviour import FamilyComponent
+from ptcc_certify.theorems.family_behaviour import FamilyComponent, mode_name
+
+if TYPE_CHECKING:
+    from ptcc_certify.gain_design.answer import AgentsDesign, Design
+    from ptcc_certify.graphs.digraph import SignedDigraph
 
 ORIENTATION = {
     "information": "row a,b: information flows a -> b",
@@ -281,3 +286,35 @@ def remarks_on(structure: Structure) -> list[str]:
         ("variable" in read, f"variable {agent_text(str(read.get('variable')))}"),
     )
     return [*(text for holds, text in remarks if holds), *read["notes"]]
+
+
+def structure_facts(structure: Structure, name: str) -> list[Fact]:
+    """Return what is told of a graph alone: its structure, and what follows from it."""
+    claims = structure_claims(structure, [component.claim for component in structure.components])
+    return [*graph_facts(structure, name), *leader_facts(structure), *claims]
+
+
+def decision_facts(
+    components: Sequence[FamilyComponent], family: Family, name: str, read: str = "", details: bool = True
+) -> list[Fact]:
+    r"""Return what is told of a family alone: what it does, decided on edges.
+
+    Examples
+    --------
+    >>> unsure = Family.from_intervals([("a", "b", -1, 0), ("b", "a", 1, 2)])
+    >>> for fact in decision_facts(ptcc.decide(unsure), unsure, "pair"):
+    ...     if not fact.detail:
+    ...         print(f"{fact.head}: {fact.text}")
+    family: pair: 2 nodes, 2 edges, 2 uncertain, 1 of them optional
+    claim: depends on the signal
+    why: the state a=1, b=1 rests at the least weights and moves with a -> b on
+    constant: where weights never change: it depends on the weights
+    groups: no limit is claimed of a, b
+    """
+    return [*family_facts(family, name, read, components if details else None), *family_claims(components)]
+
+
+def design_facts(answer: Design | AgentsDesign, graph: SignedDigraph | None = None, name: str = "") -> list[Fact]:
+    """Return what is told of a design, and of its graph: request, verdict, gains, what is proved, deadlines."""
+    of_graph: Any = () if graph is None else graph_facts(analyse(graph), name)
+    return [*of_graph, *answer.facts()]

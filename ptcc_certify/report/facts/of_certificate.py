@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from fractions import Fraction
+from operator import add
 from typing import TYPE_CHECKING
 
-from lmi.exact.decimal_rounding import near
-from ptcc_certify.certificate.assessment import rejects
+from lmi.exact.decimal_rounding import down, near, up
+from lmi.exact.elementary_enclosures import LARGEST_PUSH
+from ptcc_certify.certificate.assessment import CERTIFIED, rejects
 from ptcc_certify.certificate.fact import Fact, Facts
-from ptcc_certify.errors import joined
+from ptcc_certify.errors import Change, Sentence, joined, labelled, spell
 from ptcc_certify.report.facts.agents import agents_facts
 from ptcc_certify.report.facts.claim import assumptions, claim_facts, family_claims
 from ptcc_certify.report.facts.constrained_switching import signal_facts
@@ -21,14 +25,164 @@ from ptcc_certify.report.facts.decay import (
     rate_facts,
 )
 from ptcc_certify.report.facts.graph import family_facts, graph_facts
-from ptcc_certify.report.facts.input import disturbed_facts, family_input_facts, input_facts
+from ptcc_certify.report.facts.input import disturbed_facts, family_input_facts, initial_states_text, input_facts
 from ptcc_certify.report.facts.late import late_facts
-from ptcc_certify.report.facts.question_and_verdict import protocol_facts, run_facts, verdict_facts
-from ptcc_certify.report.facts.sliding import sliding_facts
 from ptcc_certify.report.facts.states import family_final_facts, final_facts, initial_facts
+from ptcc_certify.report.text_layout import arithmetic, shorten_list, value_list
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
+    from ptcc_certify.checker.input_formulas import InitialSet
+    from ptcc_certify.model.base import Protocol, ReachingProtocol
+    from ptcc_certify.model.reaching_time import ReachingTime
+
+
+def sliding_facts(
+    labels: Sequence[str],
+    protocol: ReachingProtocol | None,
+    sigma0: Sequence[Fraction] | None,
+    reaching: Sequence[ReachingTime] | None,
+) -> Facts:
+    """Tell ``sigma(0)``, and the last proved reaching time; nothing under the nominal protocol.
+
+    Examples
+    --------
+    >>> from ptcc_certify.model.reaching_time import ReachingTime
+    >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+    >>> print(next(sliding_facts(["a"], p, [Fraction(0)], [ReachingTime(p.T_r, Fraction(0))])).text)
+    0: no reaching phase, the agents slide from the beginning
+    """
+    if protocol is None or reaching is None or sigma0 is None:
+        return
+    if not any(sigma0):
+        yield Fact(head="sigma(0)", note="0: no reaching phase, the agents slide from the beginning", detail=True)
+        return
+    values = dict(zip(labels, sigma0, strict=True))
+    yield Fact(head="sigma(0)", value=values, note=value_list(labels, sigma0), detail=True)
+    late = [labelled(label) for label, r in zip(labels, reaching, strict=True) if r.z is None]
+    last = max((r for r in reaching if r.z is not None), key=lambda r: r.z or 0, default=None)
+    clauses = []
+    if last is not None and last.z:
+        agent = labelled(labels[list(reaching).index(last)])
+        margin = f"{down(last.remaining, 3)} before T_r" if last.remaining else "nearer to T_r than a float tells"
+        others = " of others" if late else ""
+        clauses.append(f"reaching time{others} at most {up(last.time, 6)}, {margin} (agent {agent})")
+    if late:
+        pole, push = protocol.mu3 * protocol.kappa, protocol.mu2 * protocol.T_r
+        why = "0 is reached nearer to T_r than can be written"
+        if pole < 1:
+            why = "mu3 kappa < 1 and sigma(0) is large"
+        if push + pole > LARGEST_PUSH:
+            why = f"mu2 T_r + mu3 kappa is above {LARGEST_PUSH}, where no earlier instant is proved"
+        clauses.append(f"reaching time T_r for {shorten_list(late, 40)}: {why}")
+    value = None if last is None else last.time
+    yield Fact(head="sliding", value=value, side="up", note="; ".join(clauses), detail=True)
+
+
+#: Notes that are told.
+_NOTES = 3
+
+
+def gains_text(p: Protocol) -> str:
+    """Tell a protocol with its parameters."""
+    return f"{p.kind}: " + ", ".join(f"{name}={near(getattr(p, name), 12)}" for name in p.to_dict() if name != "kind")
+
+
+def protocol_facts(certificate: Certificate, origins: Mapping[str, str]) -> Facts:
+    """Tell the protocol with its parameters, and where the initial state comes from."""
+    text = f"{gains_text(certificate.protocol)}; {', '.join(_beginning(certificate, origins)) or 'no x(0)'}"
+    yield Fact(head="protocol", value=certificate.protocol, note=text)
+    more = certificate.limits or certificate.noise is not None or certificate.delta is not None
+    if more and certificate.proof.asked_messages is None:
+        text = "a line that names no limits, noise or disturbances is without them"
+        yield Fact(head="protocol", note=text, detail=True)
+
+
+def _beginning(certificate: Certificate, origins: Mapping[str, str]) -> list[str]:
+    """Tell where initial positions, velocities and so on, and sliding variables, come from."""
+    begin = [] if certificate.initial_state is None else [f"x(0) {origins.get('x(0)', 'given')}"]
+    if certificate.proof.agents is not None and (states := certificate.proof.agents.initial_state) is not None:
+        begin = []
+        for i, name in enumerate(("x(0)", "v(0)", "a(0)")[: certificate.proof.agents.order]):
+            still = i > 0 and not any(chain[i] for agent in states for chain in agent)
+            begin.append(f"{name} {origins.get(name, '0' if still else 'given')}")
+    for name, values in (certificate.proof.vehicles or {}).items():
+        if name != "order":
+            begin.append(f"{name} {origins.get(name, 'given' if any(values) else '0')}")
+    if certificate.initial_set is not None and (not begin or certificate.only_drawn):
+        begin = [initial_states_text(_set_of_positions(certificate.initial_set, certificate.proof.offsets))]
+    begin += ["in a formation"] if certificate.proof.offsets is not None else []
+    if certificate.sigma0 is not None:
+        begin += ["sigma(0) 0" if certificate.direct else f"sigma(0) {origins.get('sigma(0)', 'given')}"]
+    return begin
+
+
+def _set_of_positions(initial_set: InitialSet, places: Sequence[Fraction] | None) -> InitialSet:
+    """Return the set of ``x(0)``, where that which is kept is of ``x(0)`` less the places in a formation."""
+    center = initial_set.center
+    return initial_set if places is None else replace(initial_set, center=tuple(map(add, center, places)))
+
+
+def run_facts(certificate: Certificate) -> Facts:
+    """Tell what the simulated run showed, and which disturbance it met."""
+    run, comparison, seen = certificate.trajectory, certificate.comparison, certificate.agents_comparison
+    texts = []
+    if seen is not None:
+        word = "VIOLATED" if seen.violated else "kept"
+        texts.append(f"CVODES: bounds {word}, worst ratio of V {seen.decay:.4g}, of all bounds {seen.worst:.4g}")
+    if run is not None and run.sliding is not None:
+        texts.append(f"the run meets d = {run.sliding.source}; |d| <= delta: {run.sliding.bounded_by}")
+    if run is not None and comparison is not None and not certificate.proof.constant:
+        word = "VIOLATED" if comparison.violated else "kept"
+        if not comparison.judged:
+            word = "not tested, all is below the floor"
+        resolved = f"until 1 - t/T = {comparison.resolved_until:.1e}" if comparison.resolved_until else "throughout"
+        ratio = f"worst ratio {comparison.worst_ratio:.4g}, above integrator tolerance {resolved}"
+        texts.append(f"CVODES to 1 - t/T = {comparison.stop:.0e}: bound {word}, {ratio}")
+    if run is not None and comparison is not None and run.sliding is not None and not certificate.direct:
+        slid, last = run.sliding, int(run.sliding.reaching_z.argmax())
+        when = "at T_r only"
+        if math.isfinite(slid.reaching_z[last]):
+            when = f"at t = {slid.reaching_times[last]:.6g}, {slid.reaching_left[last]:.3g} before T_r"
+        reaching = "kept" if comparison.reaching_kept else "VIOLATED"
+        ratio = f"worst |sigma| ratio {comparison.sliding_ratio or 0:.4g}"
+        texts.append(f"reaching times {reaching}, the last {when} (agent {labelled(run.labels[last])}); {ratio}")
+    if run is not None and certificate.proof.final_state is not None:
+        gap = float(abs(run.final_state - certificate.proof.final_state).max())
+        remark = "" if run.deadline_resolved else " (the run had not settled)"
+        texts.append(f"end state within {gap:.1e} of the final state{remark}")
+    yield from (Fact(head="simulated", standing="observed", note=text, detail=True) for text in texts)
+
+
+def verdict_facts(certificate: Certificate) -> Facts:
+    """Tell the proof, remarks, and the verdict; what is not as one would wish comes first."""
+    ended = _cut_off(certificate)
+    report, assessment = certificate.checked, certificate.assessment
+    if ended:
+        yield Fact(head="time limit", note=(*ended, "; what was proved by then stands"), detail=True)
+    notes = [note for note in certificate.observed.notes if note not in certificate.proof.reading_notes]
+    yield from (Fact(head="note", note=note, detail=True) for note in notes[:_NOTES])
+    if report is None:
+        yield Fact(head="proof", standing="unproved", note="nothing to check", detail=True)
+    elif rejects(report):
+        yield Fact(head="proof", standing="unproved", note=report.lines()[-1], detail=True)
+    else:
+        proved = f"{len(report.obligations)} proof obligations proved in {arithmetic(certificate.direct)}"
+        yield Fact(head="proof", note=f"{proved}; checked without a solver: accepted", detail=True)
+    brief = assessment.brief
+    if assessment.verdict == CERTIFIED:
+        brief = joined("; ", (brief, "checked without a solver" if spell(brief) == CERTIFIED else "", ended))
+    yield Fact(head="verdict", value=assessment.verdict, note=assessment.sentence, brief=(brief,))
+
+
+def _cut_off(certificate: Certificate) -> Sentence:
+    """Tell what was cut off because it took longer than its share of the time limit; nothing if nothing was."""
+    if not certificate.observed.cut_off:
+        return ""
+    shares = "its share" if len(certificate.observed.cut_off) == 1 else "their shares"
+    limit = Change("time_limit", f"{certificate.time_limit:g}")
+    return (f"{', '.join(certificate.observed.cut_off)} cut off after {shares} of ", limit, " s")
+
 
 #: How the line ends that tells what is given.
 _FOLLOWS = ", in what follows"

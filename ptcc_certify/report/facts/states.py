@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from lmi.exact.decimal_rounding import counted, up
-from ptcc_certify.bounds.final_state.of_graph import extremes
+from ptcc_certify.bounds.final_state.of_graph import FinalState, extremes
 from ptcc_certify.bounds.final_state.opinions import disagreement, polarisation
 from ptcc_certify.certificate.constrained_switching.final_states import constant_states, last_states, states_of_signal
 from ptcc_certify.certificate.fact import Fact, Facts
@@ -28,7 +28,6 @@ from ptcc_certify.report.text_layout import (
 )
 
 if TYPE_CHECKING:
-    from ptcc_certify.bounds.final_state.of_graph import FinalState
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.checker.reading import Interval
 

@@ -21,8 +21,8 @@ from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.report.plots.final_colours import colours_of
 from ptcc_certify.report.plots.glance import plot_glance
 from ptcc_certify.report.plots.graph import node_id
-from ptcc_certify.report.plots.motion import agents_run
 from ptcc_certify.report.plots.subject import read_back, trajectory_of
+from ptcc_certify.report.plots.trajectory import agents_run
 from ptcc_certify.simulation.trajectory import Trajectory
 
 #: What is written, by what.

@@ -24,7 +24,6 @@ from ptcc_certify.report.plots.style import axes_of, finished, styled, time_labe
 from ptcc_certify.report.text_layout import printable, shorten_text
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.switching_signals import TableSignal
-from ptcc_certify.theorems.counterexample_text import mode_name
 from ptcc_certify.theorems.family_behaviour import (
     CLOSED_SET,
     DIFFERENT,
@@ -34,6 +33,7 @@ from ptcc_certify.theorems.family_behaviour import (
     TWO_COMPONENTS,
     Counterexample,
     FamilyComponent,
+    mode_name,
 )
 from ptcc_certify.theorems.kernel import Kernel
 

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure, SubFigure
 
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.fact import Fact
-from ptcc_certify.certificate.tube import tube_of
+from ptcc_certify.certificate.graph_proof import tube_of
 from ptcc_certify.errors import ParameterError, SimulationError, spell
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, LABELLED_NODES, REPEATED_NODES
 from ptcc_certify.report.facts.claim import assumptions
@@ -31,14 +31,12 @@ from ptcc_certify.report.plots.camp_lines import (
 from ptcc_certify.report.plots.decay import NothingDecays
 from ptcc_certify.report.plots.distributions import plot_final_states
 from ptcc_certify.report.plots.final_colours import at_deadline, colours_at_end, final_states, positions_of
-from ptcc_certify.report.plots.graph import delays_of, node_id, plot_graph
-from ptcc_certify.report.plots.graph_labels import INSIDE
-from ptcc_certify.report.plots.motion import agents_run, plot_formation
+from ptcc_certify.report.plots.graph import INSIDE, delays_of, node_id, plot_graph
 from ptcc_certify.report.plots.sizes import DOUBLE_COLUMN, SINGLE_COLUMN, current_sizes
 from ptcc_certify.report.plots.style import BEHIND, BOUND, STYLE, finished, legend_columns, new_axes, shown, time_label
 from ptcc_certify.report.plots.subject import read_back, trajectory_of
 from ptcc_certify.report.plots.tracking import plot_tracking
-from ptcc_certify.report.plots.trajectory import plot_trajectory
+from ptcc_certify.report.plots.trajectory import agents_run, plot_formation, plot_trajectory
 from ptcc_certify.report.text_layout import NO_BREAK, columns
 from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.family_behaviour import DEPENDS

@@ -18,7 +18,6 @@ from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.report.facts.input import initial_states_text
 from ptcc_certify.report.plots.camp_lines import NAME_SIZE, draw_agents, draw_deadlines, name_agents
 from ptcc_certify.report.plots.final_colours import colours_at_end
-from ptcc_certify.report.plots.motion import agents_run
 from ptcc_certify.report.plots.runs_under_signals import (
     bound_label,
     count_of_signals,
@@ -29,6 +28,7 @@ from ptcc_certify.report.plots.runs_under_signals import (
 )
 from ptcc_certify.report.plots.style import BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.report.plots.subject import certifies_family, limits_text, require_same, structure_of, trajectory_of
+from ptcc_certify.report.plots.trajectory import agents_run
 from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.simulation.member_laplacians import Members
 from ptcc_certify.simulation.trajectory import Trajectory

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ptcc_certify.bounds.delay.late_messages import LateBounds
-from ptcc_certify.certificate.asked_run import late_run
+from ptcc_certify.certificate.evidence import late_run
 from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.graph_proof import GraphProof
 from ptcc_certify.errors import Change, ParameterError
