@@ -9,7 +9,8 @@ cert.save("certificate.json")
 
 The names at the top, by topic:
 
-- Graphs: ``SignedDigraph``, ``as_graph``, ``as_state``, ``read_graph``, ``write_graph``, ``analyse``, ``Structure``
+- Graphs: ``SignedDigraph``, ``as_graph``, ``as_state``, ``read_graph``, ``write_graph``, ``with_stubborn``,
+  ``analyse``, ``Structure``
 - Families of graphs: ``Family``, ``as_family``, ``read_family``, ``decide``, ``DwellTime``, ``JointWindows``,
   ``ClockShares``
 - Protocols, disturbances, actuators: ``Agents``, ``companion_form``, ``NominalProtocol``, ``SlidingModeProtocol``,
@@ -56,6 +57,7 @@ _EXPORTS = {
     # Families of graphs
     "Family": "graphs.family",
     "as_family": "graphs.io",
+    "with_stubborn": "graphs.io.with_stubborn",
     "read_family": "graphs.io",
     "decide": "theorems.family_behaviour",
     "DwellTime": "model.constrained_switching",

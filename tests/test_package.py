@@ -35,7 +35,7 @@ def test_a_function_at_the_top_keeps_its_signature_and_is_pickled_by_its_name():
 def test_the_docstring_lists_every_name_at_the_top_and_there_are_few():
     listed = re.findall(r"``(\w+)``", ptcc_certify.__doc__)
     assert sorted(listed) == sorted(set(ptcc_certify.__all__) - {"__version__"})
-    assert len(listed) <= 70
+    assert len(listed) <= 71
 
 
 def test_rooms_are_loaded_when_they_are_named():

@@ -330,9 +330,9 @@ class Tracking:
     >>> two = Fraction(2)
     >>> for n in (1, 2, 3):
     ...     print(*map(float, Tracking(n, (two, two, two), Fraction(1, 2), two, two).ahead))
-    1.0 1.0 0.0 0.0
-    1.0 1.0 0.25 0.0
-    1.5 1.0 1.0 0.09375
+    1.0 1.0 0.0 0.0 0.0
+    1.0 1.0 0.25 0.0 0.0
+    1.5 1.0 1.0 0.09375 0.0
     """
 
     order: int

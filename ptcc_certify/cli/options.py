@@ -236,7 +236,11 @@ def read_alone(graph: Any, options: Options) -> SignedDigraph:
 
 def with_stubborn(given: SignedDigraph | Family, options: Options) -> SignedDigraph | Family:
     """Return a graph or a family with the prejudices of the agents that ``--stubborn`` names."""
-    return given if options.get("stubborn") is None else given.with_stubborn(options["stubborn"])
+    if options.get("stubborn") is None:
+        return given
+    from ptcc_certify.graphs.io import with_stubborn as making
+
+    return making.with_stubborn(given, options["stubborn"])
 
 
 def reading_of(options: Options) -> dict[str, Any]:
@@ -336,8 +340,9 @@ def initial_state_of(options: Options, graph: SignedDigraph, within: Fraction | 
 
 def with_prejudices(rows: Sequence[Any], options: Options, graph: SignedDigraph) -> Sequence[Any]:
     """Return rows of numbers of each agent, with those of prejudices that ``--prejudice`` tells."""
+    from ptcc_certify.graphs.io.with_stubborn import told_by_agent
     from ptcc_certify.graphs.labels import first_five
-    from ptcc_certify.graphs.stubborn import prejudices, told_by_agent
+    from ptcc_certify.graphs.stubborn import prejudices
 
     if options.get("prejudice") is None:
         return rows

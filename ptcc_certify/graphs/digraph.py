@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from scipy import sparse
 
-    from ptcc_certify.graphs.family import Family
     from ptcc_certify.graphs.io.raw_edges import Rows
 
 _SURROGATE_PAIR = re.compile("[\ud800-\udbff][\udc00-\udfff]")
@@ -572,23 +571,6 @@ class SignedDigraph(ReadOnly, Shown):
             raise GraphError(f"there is no edge {shorten(self.labels[a])} -> {shorten(self.labels[b])}")
         keep = np.array([k for k, pair in enumerate(pairs) if pair not in out], dtype=np.int64)
         return SignedDigraph(self.labels, self.source[keep], self.target[keep], self._weights.take(keep), self.read)
-
-    def with_stubborn(self, stubborn: Any) -> SignedDigraph | Family:
-        """Return the graph in which some agents are stubborn: see :func:`ptcc_certify.graphs.stubborn.with_stubborn`.
-
-        Parameters
-        ----------
-        stubborn : mapping of label to number, pair of numbers or text; number or text
-            The weights of prejudices, each of which is one node more; where one is an interval a family is returned.
-
-        Examples
-        --------
-        >>> SignedDigraph.from_edges([("a", "b", 1)]).with_stubborn({"b": 2}).edges
-        (('a', 'b', Fraction(1, 1)), ("b's prejudice", 'b', Fraction(2, 1)))
-        """
-        from ptcc_certify.graphs.stubborn import with_stubborn
-
-        return with_stubborn(self, stubborn)
 
     @cached_property
     def sha256(self) -> str:

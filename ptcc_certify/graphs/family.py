@@ -278,22 +278,6 @@ class Family(Shown):
         """Return the family on the nodes ``nodes`` (indices, ascending) and the edges among them."""
         return Family(tuple(mode.restricted(nodes) for mode in self.modes), self.notes)
 
-    def with_stubborn(self, stubborn: Any) -> Family:
-        """Return the family in which some agents are stubborn, in every mode: see :meth:`SignedDigraph.with_stubborn`.
-
-        Parameters
-        ----------
-        stubborn : mapping of label to number, pair of numbers or text; number or text
-
-        Examples
-        --------
-        >>> Family.from_intervals([("a", "b", 1, 2)]).with_stubborn("b=0.3..0.5")
-        Family(3 nodes, 2 of 2 weights uncertain)
-        """
-        from ptcc_certify.graphs.stubborn import with_stubborn
-
-        return with_stubborn(self, stubborn)  # type: ignore[return-value]
-
     @cached_property
     def sha256(self) -> str:
         r"""SHA-256 of nodes and modes.

@@ -76,7 +76,7 @@ def test_the_final_state_of_a_certificate_is_that_of_the_formula(seed: int) -> N
     graph = graph_of(seed)
     theta, told, x0 = asked_of(graph, seed)
     p = {label: told.get(label, x0[graph.labels.index(label)]) for label in theta}
-    debate = graph.with_stubborn(theta)
+    debate = ptcc.with_stubborn(graph, theta)
     begin = dict(zip(graph.labels, x0, strict=True)) | {f"{label}'s prejudice": x for label, x in told.items()}
     cert = ptcc.certify(debate, PROTOCOL, begin, asks=ptcc.Asks(method="perron", simulation=False))
     expected = by_formula(graph, theta, p, x0)
@@ -89,7 +89,7 @@ def test_the_final_state_of_a_certificate_is_that_of_the_formula(seed: int) -> N
 
 def test_an_agent_that_is_not_reached_from_a_prejudice_stays_out_of_the_formula() -> None:
     """3 hears a stubborn agent and an ordinary leader: what 3 ends at is no function of prejudices alone."""
-    graph = ptcc.SignedDigraph.from_edges([(1, 3, 1), (2, 3, 1)]).with_stubborn({"1": 1})
+    graph = ptcc.with_stubborn([(1, 3, 1), (2, 3, 1)], {"1": 1})
     assert ptcc.final_state(graph, {"1": 0, "2": 5, "3": 9, "1's prejudice": 1})["3"] == 3
 
 
@@ -97,7 +97,7 @@ def test_four_people_end_where_friedkin_and_johnsen_print_it() -> None:
     """The packaged example has prejudices as leaders u1, u2 and u4."""
     known = ptcc.as_graph(Path(ptcc.__file__).parent / "examples" / "published" / "four_people.csv")
     people = known.without_nodes("u1", "u2", "u4")
-    debate = people.with_stubborn({"1": "0.22", "2": "0.215", "4": "0.286"})
+    debate = ptcc.with_stubborn(people, {"1": "0.22", "2": "0.215", "4": "0.286"})
     end = ptcc.final_state(debate, {"1": 25, "2": 25, "3": 75, "4": 85})
     assert [round(float(end[k])) for k in "1234"] == [60, 60, 75, 75]
     old = ptcc.final_state(known, {"1": 25, "2": 25, "3": 75, "4": 85, "u1": 25, "u2": 25, "u4": 85})
@@ -106,7 +106,7 @@ def test_four_people_end_where_friedkin_and_johnsen_print_it() -> None:
 
 def test_polarisation_and_disagreement_are_of_agents_alone() -> None:
     graph = ptcc.as_graph(StringIO(TEAM))
-    debate = graph.with_stubborn({"ann": "0.5", "dan": 1})
+    debate = ptcc.with_stubborn(graph, {"ann": "0.5", "dan": 1})
     begin, end = ptcc.as_state([5, 2, 4, -1], debate), ptcc.final_state(debate, [5, 2, 4, -1]).states
     assert [polarisation(graph, x[:4]) for x in (begin, end)] == [polarisation(debate, x) for x in (begin, end)]
     assert polarisation(graph, [5, 2, 4, -1]) == Fraction(21, 4)
@@ -119,7 +119,7 @@ def test_polarisation_and_disagreement_are_of_agents_alone() -> None:
 
 
 def test_entries_of_prejudices_may_be_left_out_of_every_state() -> None:
-    graph = ptcc.as_graph(StringIO(TEAM)).with_stubborn("dan=1, ann=0.5")
+    graph = ptcc.with_stubborn(ptcc.as_graph(StringIO(TEAM)), "dan=1, ann=0.5")
     assert graph.labels[4:] == ("ann's prejudice", "dan's prejudice") and prejudices(graph) == {4: 0, 5: 3}
     by_label = {"eve": 4, "dan": -1, "ann": 5, "bob": 2}
     assert ptcc.as_state([5, 2, 4, -1], graph) == ptcc.as_state(by_label, graph) == [5, 2, 4, -1, 5, -1]
@@ -137,18 +137,18 @@ def test_entries_of_prejudices_may_be_left_out_of_every_state() -> None:
 
 def test_intervals_of_stubbornness_make_a_family_and_keep_every_mode() -> None:
     graph = ptcc.SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 2)])
-    family: Any = graph.with_stubborn({"a": ("0.3", "0.5"), "b": 1})
+    family: Any = ptcc.with_stubborn(graph, {"a": ("0.3", "0.5"), "b": 1})
     assert stubborn_text(stubbornness(family)) == "a=3/10..1/2,b=1"
-    assert family.modes[0].mandatory == graph.with_stubborn({"a": "0.3", "b": 1})
-    cert = ptcc.certify(graph.with_stubborn("a=0.3..0.5"), PROTOCOL, [3, -4])
+    assert family.modes[0].mandatory == ptcc.with_stubborn(graph, {"a": "0.3", "b": 1})
+    cert = ptcc.certify(ptcc.with_stubborn(graph, "a=0.3..0.5"), PROTOCOL, [3, -4])
     assert cert.assessment.verdict == "certified" and set(cert.final_state["b"]) == {3}  # whatever the weight is
     both = ptcc.Family.switching({"day": graph, "night": ptcc.SignedDigraph.from_edges([("a", "b", 3)])})
-    modes = both.with_stubborn("0.5").modes
+    modes = ptcc.with_stubborn(both, "0.5").modes
     assert [mode.n_edges for mode in modes] == [4, 3] and [mode.name for mode in modes] == ["day", "night"]
     undirected = ptcc.SignedDigraph.from_edges([("a", "b", 1)], undirected=True)
-    loose: Any = ptcc.Family.from_graph(undirected, uncertainty="10%").with_stubborn({"a": 1})
+    loose: Any = ptcc.with_stubborn(ptcc.Family.from_graph(undirected, uncertainty="10%"), {"a": 1})
     assert not loose.modes[0].tied and "by themselves" in loose.notes[-1]
-    unsure = ptcc.Family.from_graph(undirected.with_stubborn({"a": 1}), uncertainty="10%")
+    unsure = ptcc.Family.from_graph(ptcc.with_stubborn(undirected, {"a": 1}), uncertainty="10%")
     after = ptcc.certify(unsure, PROTOCOL, [1, 1])
     assert after.assessment.verdict == "certified"  # no edge without its reverse
 
@@ -173,7 +173,7 @@ BAD = {
 def test_what_is_no_stubbornness_is_refused_in_one_line(case: str) -> None:
     given, message = BAD[case]
     with pytest.raises((ParameterError, UnknownAgentError), match=message) as caught:
-        ptcc.SignedDigraph.from_edges([("a", "b", 1)]).with_stubborn(given)
+        ptcc.with_stubborn([("a", "b", 1)], given)
     assert "\n" not in str(caught.value)
 
 
@@ -181,7 +181,7 @@ def test_a_node_that_is_called_like_a_prejudice_is_not_taken_for_one() -> None:
     graph = ptcc.SignedDigraph.from_edges([("a", "b", 1), ("b's prejudice", "a", 1)])
     assert not prejudices(graph)
     with pytest.raises(GraphError, match="a node is called b's prejudice already; rename it"):
-        graph.with_stubborn({"b": 1})
+        ptcc.with_stubborn(graph, {"b": 1})
 
 
 # ---------------------------------------------------------------------- on the command line

@@ -334,7 +334,7 @@ def draw_states(seed: Any, graph: SignedDigraph, name: str = "x0", dimension: in
     Examples
     --------
     >>> graph = SignedDigraph.from_edges([("a", "b", 1)])
-    >>> draw_states(7, graph) == draw_states(7, graph.with_stubborn("b=2"))[:2]
+    >>> draw_states(7, graph) == draw_states(7, with_stubborn(graph, "b=2"))[:2]
     True
     """
     still, drawn = still_of(name), random_states(seed, len(agent_nodes(graph)), dimension)
