@@ -275,7 +275,7 @@ def test_stubborn_agents_go_with_whatever_goes_with_leaders(words: tuple[str, ..
 
 
 def test_names_of_prejudices_are_drawn_in_rows_that_keep_off_the_runs() -> None:
-    cert = ptcc.certify(ptcc.as_graph(StringIO(TEAM)).with_stubborn("ann=0.5,dan=1"), PROTOCOL, [5, 2, 4, -1])
+    cert = ptcc.certify(ptcc.with_stubborn(ptcc.as_graph(StringIO(TEAM)), "ann=0.5,dan=1"), PROTOCOL, [5, 2, 4, -1])
     figure = ptcc.plot_glance(cert).figure
     figure.canvas.draw()
     texts = {text.get_text(): text for ax in figure.axes for text in ax.texts}
