@@ -125,7 +125,7 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
         with progress(("simulation",)) as begin:
             begin("simulation")
             motion = _run_agents(graph[0], signed, protocol, options)
-        _write(motion, output, "motion.plot_motion", {"wide": wide, "time_unit": time_unit})
+        _write(motion, output, "trajectory.plot_motion", {"wide": wide, "time_unit": time_unit})
         if protocol.reaching is not None:
             click.echo("note: u is without the sliding terms, which cancel the disturbance", err=True)
         return ExitCode.OK
@@ -167,7 +167,7 @@ def _of_certificate(graph: tuple[str, ...], output: str | None, samples: int, lo
     except RejectedCertificate as error:
         print_lines(f"rejected: {error}", err=True)
         return ExitCode.VIOLATED
-    _write(run, output, "trajectory.plot_run" if part is None else "motion.plot_motion", look)
+    _write(run, output, "trajectory.plot_run" if part is None else "trajectory.plot_motion", look)
     if own is None and (certificate.proof.late is not None or certificate.limits):
         click.echo("note: the run is of the protocol alone: without limits, nothing late, leaders at rest", err=True)
     return ExitCode.OK
