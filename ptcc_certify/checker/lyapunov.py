@@ -212,7 +212,7 @@ def _deviation(
         p, q = (section.norm * common**2 / scale).as_integer_ratio()
         N = combined("the deviation of the norm", (p, S), (-q, final.gram))
         need(p >= 0 and doc.exact.definite(N), "the constant of the norm is not proved")
-    doc.done(f"squared distance from the final state at most {up(section.norm)} V")
+    doc.done(f"squared distance <= {up(section.norm)} V")
     return constants
 
 
