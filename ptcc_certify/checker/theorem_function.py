@@ -250,4 +250,4 @@ def _interval(doc: Document, paper: Paper, gamma: Mapping[int, Fraction]) -> Non
         need(admissible, "an end is not proved admissible")
     need(paper.rho <= ends["exact"], "rho lies beyond the interval")
     printed, exact = (down(ends[key]) for key in ("printed", "exact"))
-    doc.done(f"rho up to {printed} by the printed formula, up to {exact} by exact arithmetic")
+    doc.done(f"rho <= {printed} as printed, <= {exact} exactly")

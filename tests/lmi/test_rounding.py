@@ -168,8 +168,8 @@ def test_the_check_rounds_to_the_safe_side(k: int, stdlib: bool):
         if step.kind == "margin":
             below(re.findall(rf", rate {NUMBER}", said), Fraction(rates["paper"]))
         if step.kind == "rho-interval":
-            for name, way in (("printed", "the printed formula"), ("exact", "exact arithmetic")):
-                below(re.findall(rf"up to {NUMBER} by {way}", said), numbers[name])
+            for name, way in (("printed", "as printed"), ("exact", "exactly")):
+                below(re.findall(rf"<= {NUMBER} {way}", said), numbers[name])
         if step.kind == "overshoot" and function is not None:
             above(re.findall(NUMBER, said), Fraction(function["overshoot"]))
         if step.kind == "deviation" and function is not None:
