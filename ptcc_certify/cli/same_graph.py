@@ -183,7 +183,8 @@ def _flags_that_agree(pair: _Pair, options: shared.Options) -> str | None:
     for told in ({**options, **sender, **typed}, {**options, **sender}):
         try:
             if pair.compare(told).reason is None:
-                return _flags(options, told, pair.files[0]) or None
+                asked = f"--edges {told['edges']}" if options["edges"] is None and told["edges"] else None
+                return _flags(options, told, pair.files[0]) or asked  # by a header that tells no direction
         except PTCCError:
             continue
     return None

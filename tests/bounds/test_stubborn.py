@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from fractions import Fraction
 from io import StringIO
@@ -203,6 +204,15 @@ def test_a_certificate_with_stubborn_agents_is_of_the_graph_of_the_same_flag() -
     wrong = command("check", "f.json", "team.csv")
     assert "accepted if --edges listens --stubborn ann=3/10..1/2 is" in " ".join(wrong.out.split())
     assert command("check", "f.json", "team.csv", *interval, "--edges", "listens").code in (0, 4)
+
+
+def test_a_prejudice_has_the_order_of_its_agent() -> None:
+    Path("team.csv").write_text("ann,bob,1\nbob,ann,1\nbob,eve,-1\n", encoding="utf-8")
+    options = ("--stubborn", "bob=0.5", "--orders", "ann=1,bob=3,eve=2", "--x0", "ann=1,bob=2,eve=-4")
+    assert command("certify", "team.csv", *options, "-q", "-o", "c.json").code == 0
+    document = json.loads(Path("c.json").read_text(encoding="utf-8"))
+    assert list(document["messages"]["vehicles"]["orders"].values()) == ["1", "3", "2", "3"]
+    assert command("check", "c.json").code == 0
 
 
 def test_a_scenario_and_a_file_tell_who_is_stubborn_and_to_what() -> None:

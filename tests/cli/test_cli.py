@@ -277,6 +277,15 @@ def test_check_reads_the_graph_as_its_reader_says_not_its_sender(folder: Path):
     assert run.code == 1 and run.out.splitlines()[-1].endswith("accepted if --duplicates sum is what you mean")
 
 
+def test_check_names_the_direction_that_a_header_does_not_tell(folder: Path):
+    Path("de.csv").write_text("von;zu;gewicht\nann;bob;0,5\nbob;ann;1,5\n", encoding="utf-8")
+    for way in ("information", "listens"):
+        words = ("--edges", way, "--no-simulation", "-o", "c.json")
+        assert ptcc("certify", "de.csv", "--method", "paper", *words).code == 0
+        run = ptcc("check", "c.json", "de.csv")
+        assert run.code == 1 and f"accepted if --edges {way} is what you mean" in " ".join(run.out.split())
+
+
 def test_check_tells_from_standard_input_what_would_agree(folder: Path):
     content = b"a,b,1\nb,c,2\n"
     Path("ties.csv").write_bytes(content)

@@ -1715,6 +1715,21 @@ def test_integers_of_json_that_are_names_and_positions_of_other_nodes_are_refuse
     assert told(graph) == expected("0>1=-1")
 
 
+@pytest.mark.parametrize("separator", [";", "\t", " "])
+def test_a_first_row_of_two_decimal_commas_is_not_split_at_them(tmp_path, separator):
+    content = "a;b;0,5;0,7\nb;a;0,5;0,9\n".replace(";", separator)
+    with pytest.raises(FormatError, match="decimals with a point"):
+        read_graph(put(tmp_path, "g.csv", content))
+    assert told(read_graph(put(tmp_path, "h.csv", "a,b,0.5\nb,a,2\n"))) == expected("a>b=0.5 b>a=2")
+
+
+@pytest.mark.parametrize("content", ["a,0,5\nb,1,5\n", "node,value\na,0,5\nb,1\n"])
+def test_states_do_not_lose_what_follows_a_decimal_comma(tmp_path, content):
+    (tmp_path / "x.csv").write_text(content)
+    with pytest.raises(FormatError, match="3 fields, and 2 are meant; separate fields by semicolons"):
+        read_state(tmp_path / "x.csv", read_graph(put(tmp_path, "g.csv", "a,b,1\n")))
+
+
 def test_decimal_commas_beside_semicolons_are_read_wherever_a_number_stands(tmp_path):
     edges = put(tmp_path, "e.csv", "source;target;weight;delay\na;b;0,5;0,02\nb;a;-1;0\n")
     graph = read_graph(edges)

@@ -23,7 +23,7 @@ from ptcc_certify.graphs.io.signs import WEIGHT, plain, sign_of_word
 from ptcc_certify.graphs.io.table_columns import Columns, asks_of_corner, columns_of, names_edges
 from ptcc_certify.graphs.io.text_matrices import bracketed_matrix, is_entry, table_as_matrix
 from ptcc_certify.graphs.labels import first_five, ordered_labels
-from ptcc_certify.graphs.rationals import parse_exact, shorten
+from ptcc_certify.graphs.rationals import COMMA, parse_exact, shorten
 from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.graphs.size_limits import MAX_LINE
 
@@ -100,9 +100,13 @@ def _separator(line: str) -> tuple[str | None, bool]:
     """Return the separator that gives most fields, three at most, and whether it gives several.
 
     Filled fields count first, so that ``a;b;0,5`` is split at its semicolons; then empty ones, as in ``a;;``.
+    Commas that are all in numbers between other separators, as in ``a;0,5`` and ``a;b;0,5;0,1``, separate nothing.
     """
-    if re.fullmatch(r"[^,;]+;\s*[+-]?\d*,\d+\s*", line):  # a;0,5
-        return ";", True
+    for separator, least in ((";", 2), ("\t", 2), (None, 3)):
+        fields = _csv_fields([line], separator, strict=False)
+        with_comma = [field for field in fields if "," in field]
+        if with_comma and len(fields) >= least and all(map(COMMA.fullmatch, with_comma)) and '"' not in line:
+            return separator, True
 
     def rank(separator: str | None) -> tuple[int, int]:
         row = _csv_fields([line], separator, strict=False)

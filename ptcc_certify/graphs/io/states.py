@@ -29,7 +29,7 @@ _VALUE = ("value", "state", "x", "x0", "sigma0")
 
 
 #: Whose entries of prejudices, where they are not given, are those of their agents; others are 0.
-_SHARED = ("x0", "initial state", "offsets", "low", "high", "center", "axes")
+_SHARED = ("x0", "orders", "initial state", "offsets", "low", "high", "center", "axes")
 #: Largest entry of an initial state, in size: final states and trajectories are also reported as floats.
 LARGEST_STATE = Fraction(1e300)  # the float, which exceeds 10^300 a little
 
@@ -351,15 +351,19 @@ def _with_prejudices(entries: dict[str, Any], graph: SignedDigraph, still: Any) 
 def _state_of_file(path: str | os.PathLike[str], graph: SignedDigraph, still: Fraction | None) -> list[Fraction]:
     name, _ = name_and_ending(path)
     columns: tuple[int, int] | None = None
+    width = 0
     pairs, rows = [], Records(read_bytes(path, name), name)
     for number, texts in rows:
         place, row = f"{name}, line {number}", [text.strip() for text in texts]
         if columns is None:
             node, value = _node_and_value(pointed(row, rows.commas), place)
             if node is not None and value is not None:
-                columns = node, value
+                columns, width = (node, value), len(row)
                 continue
-            columns = 0, 1
+            columns, width = (0, 1), 2
+        if any(text[:1].isdigit() for text in row[width:]):
+            mend = "separate fields by semicolons where numbers have decimal commas, or write a point"
+            raise FormatError(f"{place}: {len(row)} fields, and {width} are meant; {mend}")
         cells = [row[i] for i in columns if i < len(row) and row[i]]
         if any(row) and len(cells) < 2:
             raise FormatError(f"{place}: a row needs a node and a value; write node,value")
