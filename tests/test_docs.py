@@ -812,3 +812,13 @@ def test_every_section_of_the_theory_that_code_cites_is_there():
     cited = {one for path in sources for one in sections_cited(path.read_text(encoding="utf-8"))}
     assert len(cited) > 10
     assert not sorted((page, name) for page, name in cited if name not in headings(page))
+
+
+def test_the_page_of_claims_speaks_of_everything_that_the_paper_numbers():
+    text = Path("docs/theory/claims.md").read_text(encoding="utf-8").partition("(claims-threshold)=")[0]
+    counts = {"Theorem": 6, "Lemma": 9, "Corollar": 10, "Definition": 5, "Remark": 10, "Proposition": 1, "Example": 6}
+    for word, most in counts.items():
+        lists = re.findall(rf"{word}(?:s|y|ies)? ((?:\d+(?:, | to )?)+)", text)
+        told = {k for text in lists for k in re.findall(r"\d+", text)}
+        told |= {str(k) for a, b in re.findall(r"(\d+) to (\d+)", " ; ".join(lists)) for k in range(int(a), int(b))}
+        assert {str(k) for k in range(1, most + 1)} <= told, word
