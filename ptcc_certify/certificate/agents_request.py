@@ -21,7 +21,7 @@ from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.model.agents import DERIVATIVES, MOST_DIMENSION, MOST_TRACKING, PLURALS, Agents
 from ptcc_certify.model.asks import Case, InitialState
 from ptcc_certify.model.gain import Gain
-from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.late_messages import LateMessages, MovingLeaders
 from ptcc_certify.model.parameters import parameter, readable
 from ptcc_certify.model.refusals import (
     NOT_LATE,
@@ -108,9 +108,9 @@ def with_vehicles(case: Case) -> Case:
         raise ParameterError("dimension", "what is proved of vehicles on a line holds in each coordinate: give one")
     in_formation = any(h for (h,) in chains.offsets)
     cap = one_cap([agents.cap, *(limit.gain_cap for limit in case.limits), getattr(case.messages, "gain_cap", None)])
-    if disturbance and 1 in orders:
-        label = shorten(graph.labels[orders.index(1)])
-        raise ParameterError("delta", f"is not proved yet of agents of order 1, as {label}, in a team; leave it out")
+    if disturbance and 1 in orders:  # whose virtual positions are their own
+        leaders = MovingLeaders(speed=0) if case.leaders is None else case.leaders
+        case = replace(case, leaders=replace(leaders, disturbance=disturbance))
     vehicles = replace(_vehicles(chains.states, orders, graph), disturbance=disturbance)
     if case.messages is None:
         messages = LateMessages(gain_cap=cap, vehicles=vehicles)

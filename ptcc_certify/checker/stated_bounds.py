@@ -467,6 +467,8 @@ def passed_on(messages: Messages, left: Fraction, cap: Fraction | None, tracking
         found.append(
             Passed(one.falling * y, one.standing * stands, one.begun * y, one.pushed * y, one.disturbed * stands)
         )
+    if tracking.order == 1:  # whose velocity is what disturbs it, too
+        found[1] = found[1]._replace(disturbed=Fraction(1))
     return tuple(found)
 
 
@@ -502,7 +504,6 @@ class Vehicles:
     def __init__(self, doc: Document, messages: Messages, section: VehiclesSection):
         doc.at = "messages.vehicles"
         self.labels, self.messages, self.section = doc.context.labels, messages, section
-        need(messages.leaders is None or messages.leaders.disturbance == 0, "vehicles that are disturbed")
         capped = messages.gain_cap is not None
         stated = [section.velocity is not None, section.input is not None]
         need(stated == [capped, capped], "velocity and input are stated iff the gain has a cap")
@@ -520,7 +521,9 @@ class Vehicles:
         self.gains = section.a1, section.a2, *([] if section.a3 is None else [section.a3])
         self.steps: VehicleSteps | None = None
         self.disturbance = section.disturbance or Fraction(0)
-        need(not self.disturbance or 1 not in self.orders, "agents of order 1 that are disturbed")
+        pushed = self.disturbance if 1 in self.orders else 0  # virtual positions of agents of order 1 are their own
+        driven = Fraction(0) if messages.leaders is None else messages.leaders.disturbance
+        need(driven == pushed, "leaders.disturbance is that of agents of order 1")
 
     def by_rows(self, rows: Rows, decay: Decay) -> None:
         """Mark what is at least as large as this decay makes it, unless it is too fast for the gains."""

@@ -66,9 +66,14 @@ TEAMS = {
     "shaken": {},
     "shaken-capped": CASES["capped"],
     "shaken-late-moving": CASES["late-moving"],
+    "driven": {},
+    "driven-capped": CASES["capped"],
+    "driven-late-moving": CASES["late-moving"],
 }
 CASES |= TEAMS
-ORDERS, SHAKEN = (3, 2, 1, 3, 2), (3, 2, 2, 3, 2)  # of which those of order 1 cannot be disturbed
+ORDERS, SHAKEN = (3, 2, 1, 3, 2), (3, 2, 2, 3, 2)
+#: Whom something disturbs; agents of order 1 by themselves drive virtual positions.
+DISTURBED = ("shaken", "driven")
 KIND = {False: "late-vehicles", True: "late-team"}
 
 
@@ -94,8 +99,10 @@ def problem(seed: int, name: str) -> tuple[SignedDigraph, NominalProtocol, Initi
     if name not in TEAMS:
         return graph, protocol, InitialState(x0, v0=v0)
     still = [name.endswith("moving") and not d for d in graph.in_weight()]
+    if name.startswith("driven"):
+        still = [not d for d in graph.in_weight()]
     orders = orders_of(name)
-    v0 = [F(0) if n == 1 else v for v, n in zip(v0, orders, strict=False)]
+    v0 = [F(0) if n == 1 or rests else v for v, n, rests in zip(v0, orders, still, strict=False)]
     a0 = [F(0) if n < 3 or rests else 10 * v for v, n, rests in zip(v0, orders, still, strict=False)]
     return graph, protocol, InitialState(x0, derivatives=[v0, a0])
 
@@ -104,7 +111,7 @@ def problem(seed: int, name: str) -> tuple[SignedDigraph, NominalProtocol, Initi
 def certified(seed: int, name: str) -> Any:
     graph, protocol, initial = problem(seed, name)
     more = {} if "uncertainty" in CASES[name] else {"asks": Asks(simulation=False, method="paper")}
-    if name.startswith("shaken"):
+    if name.startswith(DISTURBED):
         more = {"asks": Asks(simulation=False, method="paper", delta=2)}
     return certify(graph, protocol, initial, agents=agents_of(graph, name), **CASES[name], **more)
 
@@ -253,7 +260,9 @@ def false_claims(data: Json) -> list[str]:
     if any((v and n < 2) or (x and n < 3) for v, x, n in zip(v0, acc, orders, strict=True)):
         return ["what agents of such an order have not"]
     leaders = said.get("leaders")
-    if leaders is not None and (v0[D == 0].any() or acc[D == 0].any() or number(leaders["disturbance"])):
+    push = float(number(told["disturbance"])) if "disturbance" in told else 0.0
+    driven = 0.0 if leaders is None else float(number(leaders["disturbance"]))
+    if driven != (push if 1 in orders else 0.0) or (leaders is not None and (v0[D == 0].any() or acc[D == 0].any())):
         return ["vehicles that nothing is proved of"]
     speed = 0.0 if leaders is None else float(number(leaders["speed"]))
     wrong = float(number(said["value_error"])) + speed * float(number(said["delay"]))
@@ -296,15 +305,15 @@ def false_claims(data: Json) -> list[str]:
                 continue
             made = tracked(order, gains, b, k, g[0], away[v], (p[v], 0.0), (v0[v], acc[v]))
             drawn = tracked(order, gains, b, k, g[0], drift[v], (0.0, 0.0), (0.0, 0.0))[0]
-            unrest, push = 0.0, float(number(told["disturbance"])) if "disturbance" in told else 0.0
-            if push and cap is not None:  # what it adds to y_n at T, about
+            unrest = 0.0
+            if push and cap is not None and order > 1:  # what it adds to y_n at T, about
                 way = np.exp(-b * (s[-1] - s)) / g ** (order - 1)
                 unrest = push * float((way[1:] * np.diff(t)).sum()) / (a1 - b) * 0.999
                 unrest /= 1.0 if order == 2 else a2 - b - b / (a1 - b) / k
             least["position"][v] = min(least["position"][v], made[0] * left + drawn + floor[v] + unrest)
             if cap is None:
                 continue
-            steady = shaken(order, gains, k) if push else (0.0, 0.0)
+            steady = shaken(order, gains, k) if push and order > 1 else (0.0, 0.0)
             always = push / (gains[order - 1] * g[0] ** order)
             for key, power, falls, stands, shakes in zip(
                 ("velocity", "input"), (1, order), made[1:], standing(order, gains, k), steady, strict=True
@@ -312,6 +321,7 @@ def false_claims(data: Json) -> list[str]:
                 # s is too small, and y too large, by less than a part in a thousand
                 y = (g**power * np.exp(-b * s)).max() * 0.99
                 stood = cap**power * (stands * n[v] + shakes * always)
+                stood += push * (order == 1 and key == "velocity")
                 least[key][v] = min(least[key][v], falls * y + stood)
     if "steps" in said and cap is not None and set(orders) == {2}:
         own = by_steps(data, modes[0], D, (a1, a2), v0, (T, rho1, k, cap), wrong, speed)
@@ -468,7 +478,16 @@ def test_vehicles_that_begin_on_their_targets_with_a_velocity_are_bounded():
 
 @pytest.mark.few(1)
 @pytest.mark.parametrize(
-    "name", ["team-late-capped", "shaken-late-moving", "late-capped", "late-moving", "uncertain-late-moving", "plain"]
+    "name",
+    [
+        "driven-late-moving",
+        "team-late-capped",
+        "shaken-late-moving",
+        "late-capped",
+        "late-moving",
+        "uncertain-late-moving",
+        "plain",
+    ],
 )
 def test_no_mutant_of_what_is_said_of_vehicles_is_accepted_unless_it_is_true(name: str):
     data = document(2, name)
@@ -480,7 +499,16 @@ def test_no_mutant_of_what_is_said_of_vehicles_is_accepted_unless_it_is_true(nam
 
 @pytest.mark.parametrize(
     "name",
-    ["capped", "late-capped", "late-moving", "uncertain", "team-capped", "team-late-moving", "shaken-capped"],
+    [
+        "capped",
+        "late-capped",
+        "late-moving",
+        "uncertain",
+        "team-capped",
+        "team-late-moving",
+        "shaken-capped",
+        "driven-capped",
+    ],
 )
 def test_bounds_without_a_part_of_their_formula_are_refused(name: str):
     data = document(2, name)
@@ -509,7 +537,7 @@ def test_what_is_not_stated_and_what_is_not_proved_is_refused():
     for data, path, value, why in (
         (free, (*PATH, "velocity"), told["position"], "iff the gain has a cap"),
         (capped, (*PATH, "input"), None, "input is null, and not left out"),
-        (moving, ("messages", "leaders", "disturbance"), "1/10", "disturbed"),
+        (moving, ("messages", "leaders", "disturbance"), "1/10", "that of agents of order 1"),
         (free, (*PATH, "a1"), "0", "not positive"),
         (free, (*PATH, "orders"), told["v0"], "none of 1, 2 and 3"),
         (free, (*PATH, "a3"), "1", "a3 and a0 are there iff order 3 is"),

@@ -98,7 +98,8 @@ def _vehicles(certificate: Certificate, late: LateBounds) -> Facts:
     who = names[orders[0]] if len(mixed) == 1 else ", ".join(mixed)
     text = f"{who} integrators exchange virtual positions z_k, z_k' = gain e_k"
     if late.messages.vehicles.disturbance:
-        text = f"any |d_k| <= {near(late.messages.vehicles.disturbance)} beside u_k; {text}"
+        whose = "" if late.leaders is None else " of followers"
+        text = f"any |d_k| <= {near(late.messages.vehicles.disturbance)} beside u_k{whose}; {text}"
     if (proved := late.vehicles) is None:
         yield Fact(head="agents", note=text)
         return
@@ -113,6 +114,8 @@ def _vehicles(certificate: Certificate, late: LateBounds) -> Facts:
     whole = FROM_WITHIN_1 if late.relative else ""
     for name, bounds in (("deviations", position), ("velocities", velocity)):
         largest = zip(bounds.max(axis=0).tolist(), shares, strict=True)
+        if not np.isfinite(bounds).all():  # of velocities of order 1 nothing is told without a cap
+            continue
         each = ", ".join(f"{_bound_text(late, x, 2)} at {share:g} T" for x, share in largest)
         yield Fact(head="agents", note=f"{name} at most {each}{whole}", detail=True)
 
