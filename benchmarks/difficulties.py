@@ -119,6 +119,8 @@ def ratios(made: Any, rng: np.random.Generator) -> list[tuple[str, float]]:
     late, protocol = made.late, made.protocol
     if late is None or not late.says_something or not can_run(protocol, late.messages):
         return []
+    if late.forms and not late.messages.settles:  # targets walk; tests/checker/test_leader_groups.py runs about them
+        return []
     if late.leaders is not None and late.leaders.growth:  # whose runs are in tests/bounds/test_growth.py
         return []
     if late.leaders is not None and not late.rows:  # disturbances of groups of leaders, of which there is no run

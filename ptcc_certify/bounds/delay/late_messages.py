@@ -191,7 +191,7 @@ class LateBounds:
     def goal(self) -> str:
         """What they are near to, in words."""
         if self.forms:
-            return "where it would settle" if self.messages.settles else "its target"
+            return "where it would settle" if self.messages.settles else "its target, which walks,"
         return "its final state" if self.leaders is None else f"its {self.leaders.goal}"
 
     @property

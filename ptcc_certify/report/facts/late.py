@@ -68,8 +68,11 @@ def late_facts(certificate: Certificate) -> Facts:
 def _targets(late: LateBounds) -> Facts:
     """Tell what a target is where leaders hear each other, and values are off or agents disturbed."""
     if late.forms and not late.messages.settles:
-        note = "targets are where the first leader of every group is now, in another camp its opposite; or 0"
-        yield Fact(head="left", note=note, detail=True)
+        note = "targets are where the first leader of a group is now, in another camp its opposite; or 0"
+        moved = "what is off or disturbed moves them"
+        without = late.messages.value_error and late.messages.gain_cap is None
+        moved += ", without a gain cap as far as it likes" if without else ", how far is not told"
+        yield Fact(head="left", note=f"{note}; {moved}", brief=(f"targets are where first leaders are; {moved}",))
 
 
 def _unbounded_text(late: LateBounds) -> str:
