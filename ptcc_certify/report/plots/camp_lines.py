@@ -247,7 +247,10 @@ def name_agents(
     needs = [max(text_width(name) for _, _, name, _ in column) for column in texts]
     if (free := (room - NAME_GAP * len(needs)) / WIDER) < sum(needs):
         right = [min(needs[1], max(free / 2, free - needs[0]))] if len(needs) > 1 else []
-        letters = [max(3, int(part / text_width("x"))) for part in (free - sum(right), *right)]
+        parts = zip((free - sum(right), *right), needs, strict=True)
+        letters = [
+            NAME_LENGTH + 8 if part >= need - 0.01 else max(3, int(part / text_width("x"))) for part, need in parts
+        ]
         longest = max(map(columns, names_of(agents)))
         if len(letters) > 1 and told is None and min(letters) < max(longest / 2, min(longest, SHORT)):
             letters = [max(3, int((room - NAME_GAP) / WIDER / text_width("x")))]
