@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from lmi.exact.decimal_rounding import counted
+from lmi.exact.decimal_rounding import counted, near
 from ptcc_certify.cli import click_options as declared
 from ptcc_certify.cli.scenario import graph_of, is_scenario, kind_of_protocol, read_scenario, takes_one_graph
 from ptcc_certify.errors import Change, ParameterError
@@ -355,6 +355,10 @@ def with_prejudices(rows: Sequence[Any], options: Options, graph: SignedDigraph)
     if odd := next((label for label in told if label not in nodes), None):
         raise ParameterError(f"--prejudice: {shorten(odd)} is not stubborn; stubborn are {first_five([*nodes])}")
     numbers = {nodes[label]: declared.exact_number(text, "--prejudice") for label, text in told.items()}
+    for node, agent in prejudices(graph).items():
+        if node in numbers and rows[node] not in ([numbers[node]], rows[agent]):  # of an agent unless it was given
+            given = f"--x0 gives {shorten(graph.labels[node])} {near(rows[node][0])}"
+            raise ParameterError(f"--prejudice: {given}, and this {near(numbers[node])}; keep one")
     return [[numbers[k]] if k in numbers else row for k, row in enumerate(rows)]
 
 

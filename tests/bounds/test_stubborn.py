@@ -234,6 +234,10 @@ def test_a_scenario_and_a_file_tell_who_is_stubborn_and_to_what() -> None:
 
 REFUSED = {
     "no stubborn agent": (("--prejudice", "ann=1"), "--prejudice is of stubborn agents; name them by --stubborn"),
+    "told twice": (
+        ("--stubborn", "ann=1", "--x0", "ann=5,bob=2,eve=4,dan=-1,ann's prejudice=3", "--prejudice", "ann=2"),
+        "--x0 gives ann's prejudice 3, and this 2; keep one",
+    ),
     "another agent": (("--stubborn", "ann=1", "--prejudice", "bob=1"), "bob is not stubborn; stubborn are ann"),
     "no number": (("--stubborn", "ann=1", "--prejudice", "ann=x"), '--prejudice: "x" is not a number'),
     "no text": (("--stubborn", "ann=1", "--prejudice", "high"), '--prejudice has "high", which is not label=number'),
