@@ -116,7 +116,7 @@ class VehicleBounds:
         if cap is None or case.leaders is not None:
             rows = [one for one in decays if isinstance(one, RowBound)]
             position[:, past] = np.inf if (after := self.after(case, rows)) is None else after
-        if case.leaders is not None:  # which move as they like
+        if case.leaders is not None and case.leaders.speed:  # which move as they like
             others = np.setdiff1d(np.arange(orders.size), chosen)
             position[others] = velocity[others] = 0
         return position, velocity
@@ -175,7 +175,7 @@ def bound_vehicles(
     vehicles = case.messages.vehicles
     assert vehicles is not None
     chosen = set(case.followers.tolist())
-    if case.leaders is not None:
+    if case.leaders is not None and case.leaders.speed:
         for name, values in (("v0", vehicles.v0), ("a0", vehicles.a0 or ())):
             moving = next((v for v, x in enumerate(values) if x and v not in chosen), None)
             if moving is not None:

@@ -297,7 +297,9 @@ def _read_family(case: Case) -> Family:
                 return family
             if messages.at_rest:
                 mend = "add a gain cap" if late else "leave out the vehicles, or what is off"
-                asked += "" if late else " of vehicles that exchange virtual positions"
+                if not late:
+                    what = messages.asked_of_leaders if messages.exact else messages.name
+                    asked = f"{what} of vehicles that exchange virtual positions"
         refuse_other_targets(family, asked, mend)
     return family
 

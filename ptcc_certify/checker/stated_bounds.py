@@ -529,7 +529,7 @@ class Vehicles:
         """Mark what is at least as large as this decay makes it, unless it is too fast for the gains."""
         followers, b, M = rows.followers, decay.b, decay.initial
         others = followers.others
-        if self.messages.leaders is not None:
+        if self.messages.leaders is not None and self.messages.leaders.speed:
             moved = any(self.begun[v] or self.pushed[v] for v in others)
             need(not moved, "an initial velocity of a leader that moves as it likes")
         bits = length((M, decay.floor, decay.highest))

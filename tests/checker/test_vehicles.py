@@ -99,8 +99,6 @@ def problem(seed: int, name: str) -> tuple[SignedDigraph, NominalProtocol, Initi
     if name not in TEAMS:
         return graph, protocol, InitialState(x0, v0=v0)
     still = [name.endswith("moving") and not d for d in graph.in_weight()]
-    if name.startswith("driven"):
-        still = [not d for d in graph.in_weight()]
     orders = orders_of(name)
     v0 = [F(0) if n == 1 or rests else v for v, n, rests in zip(v0, orders, still, strict=False)]
     a0 = [F(0) if n < 3 or rests else 10 * v for v, n, rests in zip(v0, orders, still, strict=False)]
@@ -262,9 +260,9 @@ def false_claims(data: Json) -> list[str]:
     leaders = said.get("leaders")
     push = float(number(told["disturbance"])) if "disturbance" in told else 0.0
     driven = 0.0 if leaders is None else float(number(leaders["disturbance"]))
-    if driven != (push if 1 in orders else 0.0) or (leaders is not None and (v0[D == 0].any() or acc[D == 0].any())):
-        return ["vehicles that nothing is proved of"]
     speed = 0.0 if leaders is None else float(number(leaders["speed"]))
+    if driven != (push if 1 in orders else 0.0) or (speed and (v0[D == 0].any() or acc[D == 0].any())):
+        return ["vehicles that nothing is proved of"]
     wrong = float(number(said["value_error"])) + speed * float(number(said["delay"]))
     t = np.unique(np.concatenate([np.linspace(0, T, 20001)[:-1], T - np.geomspace(1e-9, 1, 4000) * T]))
     gain = rho1 + k / (T - t)
@@ -375,7 +373,8 @@ def test_no_run_exceeds_a_bound(seed: int, name: str):
             simulate_late(graph, protocol, late.messages, x0, pattern=pattern, leaders=late.leaders)
             for pattern in ("oldest", "square")
         ]
-    moved = graph.in_weight() > 0 if late.leaders is not None else np.ones(graph.n_nodes, dtype=bool)
+    like = late.leaders is not None and late.leaders.speed  # leaders move as they like
+    moved = graph.in_weight() > 0 if like else np.ones(graph.n_nodes, dtype=bool)
     ends = np.asarray(certificate.final_state, dtype=float)[:, None]
     for run in (follow(one, tracking, vehicles) for one in runs):
         before = run.t < 0.999

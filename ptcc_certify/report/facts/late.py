@@ -101,7 +101,8 @@ def _vehicles(certificate: Certificate, late: LateBounds) -> Facts:
     who = names[orders[0]] if len(mixed) == 1 else ", ".join(mixed)
     text = f"{who} integrators exchange virtual positions z_k, z_k' = gain e_k"
     if late.messages.vehicles.disturbance:
-        whose = "" if late.leaders is None else " of followers"
+        leading = late.leaders is not None and ("leaders" if late.leaders.speed else "leaders of order 1")
+        whose = f", not of {leading}" if leading else ""
         text = f"any |d_k| <= {near(late.messages.vehicles.disturbance)} beside u_k{whose}; {text}"
     if (proved := late.vehicles) is None:
         yield Fact(head="agents", note=text)
