@@ -12,6 +12,7 @@ import numpy as np
 from lmi.exact.decimal_rounding import near, up
 from ptcc_certify.bounds.final_state.captured import Captured, Number, Reach
 from ptcc_certify.certificate.fact import Fact, Facts, Standing
+from ptcc_certify.graphs.stubborn import PREJUDICE
 from ptcc_certify.report.text_layout import agent_text, columns, shorten_list
 
 if TYPE_CHECKING:
@@ -60,11 +61,14 @@ def influence_facts(who: Influence) -> Facts:
 
 
 def _terms(row: Iterable[tuple[int, Any]], labels: Sequence[str], width: int = 1000) -> list[str]:
-    """Write the terms of a weighted sum of initial states, each with its sign, rounded, labels shortened."""
-    sizes = [
-        ("-" if weight < 0 else "+", f"{abs(float(weight)):.3g}", agent_text(labels[j], width)) for j, weight in row
-    ]
-    return [f"{sign} {'' if size == '1' else f'{size} '}x_{name}" for sign, size, name in sizes]
+    """Write the terms of a weighted sum of initial states, p of prejudices, each with its sign, rounded."""
+    terms = []
+    for j, weight in row:
+        size = f"{abs(float(weight)):.3g}"
+        agent, prejudice, _ = labels[j].partition(PREJUDICE)
+        name = f"p_{agent_text(agent, width)}" if prejudice else f"x_{agent_text(agent, width)}"
+        terms.append(f"{'-' if weight < 0 else '+'} {'' if size == '1' else f'{size} '}{name}")
+    return terms
 
 
 def _sum(terms: Sequence[str], width: int = 0) -> str:

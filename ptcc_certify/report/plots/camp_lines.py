@@ -14,6 +14,7 @@ from scipy.optimize import isotonic_regression
 from lmi.exact.decimal_rounding import near
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import Structure, analyse, find_camps
+from ptcc_certify.graphs.stubborn import PREJUDICE
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, STEPS, signed, tick_count
 from ptcc_certify.report.text_layout import columns, printable, shorten_text
 from ptcc_certify.simulation.agents import AgentsTrajectory
@@ -233,7 +234,8 @@ def name_agents(
             ax.plot([T, last], [told[v]] * 2, color=lines.get(v, BEHIND), gid=f"end-{v}", **point)
 
     def names_of(some: Sequence[int]) -> list[str]:
-        return [shorten_text(printable(run.labels[v]), NAME_LENGTH) for v in some]
+        labels = [printable(run.labels[v]).replace(PREJUDICE, " (p)") for v in some]
+        return [shorten_text(label, NAME_LENGTH) for label in labels]
 
     def columns_of(letters: Sequence[int]) -> list[list[tuple[float, float, str, str]]]:
         texts = [_spread(ax, values[agents, 0], names_of(agents), colours, letters[0])]
@@ -255,8 +257,11 @@ def name_agents(
         if len(letters) > 1 and told is None and min(letters) < max(longest / 2, min(longest, SHORT)):
             letters = [max(3, int((room - NAME_GAP) / WIDER / text_width("x")))]
         texts = columns_of(letters)
+        if told is not None and len(letters) > 1 and min(letters) < min(longest, SHORT):  # names at the ends alone
+            whole = max(3, int((room - NAME_GAP) / WIDER / text_width("x")))
+            texts = [[], _spread(ax, at_end[enders], names_of(enders), enders_colours, whole, tails)]
     _write_names(ax, texts, (first, last))
-    rooms = [NAME_GAP + WIDER * max(text_width(name) for _, _, name, _ in column) for column in texts]
+    rooms = [NAME_GAP + WIDER * max(text_width(name) for _, _, name, _ in column) if column else 0 for column in texts]
     own = max(wide - rooms[0] - inside * sum(rooms[1:]), wide / 3)
     left = (last - first) * rooms[0] / own
     ticks = MaxNLocator(min(tick_count(ax.xaxis, 5), max(2, int(own / TICK_ROOM))), steps=STEPS).tick_values(
@@ -360,7 +365,8 @@ def _spread(
             groups.append([int(k)])
     texts = [_written([names[k] for k in sorted(own)], tails[own[0]], letters) for own in groups]
     if any(tails) and gap * sum(1 + text.count("\n") for text in texts) > high - low:  # wider, but apart
-        texts = [text.replace("\n", " ") for text in texts]
+        wide = NAME_LENGTH + max(map(columns, tails))
+        texts = [_written([names[k] for k in sorted(own)], tails[own[0]], wide) for own in groups]
     rows = np.array([1 + text.count("\n") for text in texts])
     sizes = min(gap, (high - low) / rows.sum()) * rows
     place = np.array([at[own[0]] for own in groups])
