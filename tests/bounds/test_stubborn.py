@@ -112,7 +112,7 @@ def test_polarisation_and_disagreement_are_of_agents_alone() -> None:
     assert [polarisation(graph, x[:4]) for x in (begin, end)] == [polarisation(debate, x) for x in (begin, end)]
     assert polarisation(graph, [5, 2, 4, -1]) == Fraction(21, 4)
     assert disagreement(debate, begin) == disagreement(graph, [5, 2, 4, -1]) == 2 * 9 + 2 * 36 + 2 * 25
-    said = "opinions   from x(0) to x(T): polarisation 5.25 -> 17.96, disagreement 140 -> 6.4"
+    said = "opinions   x(0) to x(T): polarisation 5.25 -> 17.96, disagreement 140 -> 6.4"
     asked = ("certify", "team.csv", "--stubborn", "ann=0.5,dan=1", "--x0", "5,2,4,-1", "--no-simulation")
     assert said in command(*asked).out
     for more in (("--delay", "0.01"), ("--offsets", "1,2,3,4")):

@@ -101,7 +101,7 @@ def _opinion_facts(certificate: Certificate, result: FinalState) -> Facts:
         return
     values = {f.__name__: [f(graph, begin), f(graph, result.states)] for f in (polarisation, disagreement)}
     text = ", ".join(f"{name} {float(x):.4g} -> {float(y):.4g}" for name, (x, y) in values.items())
-    yield Fact(head="opinions", value=values, standing="unproved", note=f"from x(0) to x(T): {text}")
+    yield Fact(head="opinions", value=values, standing="unproved", note=f"x(0) to x(T): {text}")
 
 
 def _meeting(certificate: Certificate) -> str:
