@@ -288,6 +288,9 @@ class EdgeList(Draft):
         rows.notes, rows.asks = (*columns.notes, *self.notes, *self.nodes_alone()), columns.asks
         rows.notes += ("columns ignored: after the third",) if self.extra else ()
         rows.beside = Beside(columns.codes, None, [column for _, column in self.beside], columns.told)
+        rows.beside.titles = (
+            [columns.titles[k] for k in (columns.source, columns.target, columns.weight)] if columns.titles else []
+        )
         if columns.sign is not None:
             rows.beside.signs = Signs(list(self.signs.texts), self.sign_codes, columns.titles[columns.sign])
         ends = [columns.titles[k] for k in (columns.source, columns.target)] if columns.guessed else []

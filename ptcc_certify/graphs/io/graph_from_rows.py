@@ -20,6 +20,7 @@ from ptcc_certify.graphs.labels import in_all, ordered_labels, refuse_written_tw
 from ptcc_certify.graphs.packed_weights import LARGEST_WEIGHT, SMALLEST_WEIGHT, Weights
 from ptcc_certify.graphs.rationals import MINUS, as_fraction, decimal_mend, nearest_float, parse_exact, shorten
 from ptcc_certify.graphs.reading import Reading
+from ptcc_certify.graphs.recognised_files import shell_word
 
 #: Numbers of a type without signs that are nearer to its largest than this were negative.
 _WRAPPED = 32
@@ -193,7 +194,8 @@ class _Draft:
     def columns_mend(self) -> str:
         if not self.name:
             return "write 1 and -1, or name the weight: as_graph(.., weight=...)"
-        tell = ", or name the columns of source, target and weight: --columns a,b,w"
+        columns = shell_word(",".join(self.rows.beside.titles or "abw"))
+        tell = f", or name the columns of source, target and weight: --columns {columns}"
         return f"write 1 and -1{tell if self.rows.beside.may_be_told else ''}"
 
     def parsed(self, weight: Any, code: int) -> Fraction:

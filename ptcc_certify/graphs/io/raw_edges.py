@@ -38,6 +38,7 @@ class Beside:
     columns: Sequence[Column] = ()  # what is not read
     told: bool = False  # were the columns told, so that those beside them say nothing?
     may_be_told: bool = True  # columns, or the attribute of weights
+    titles: Sequence[str] = ()  # of source, target and weight
 
 
 @dataclass
