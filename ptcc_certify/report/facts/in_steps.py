@@ -10,7 +10,7 @@ import numpy as np
 from lmi.exact.decimal_rounding import counted, up
 from ptcc_certify.bounds.final_state.in_steps import OpinionsInSteps
 from ptcc_certify.bounds.final_state.opinions import disagreement, polarisation
-from ptcc_certify.certificate.fact import Fact, Facts
+from ptcc_certify.certificate.fact import Fact, Facts, Standing
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.stubborn import agent_nodes
 from ptcc_certify.report.facts.influence import influence_facts
@@ -51,7 +51,7 @@ def steps_facts(found: OpinionsInSteps, steps: int, within: Fraction) -> Facts:
         if some:
             names, states = [labels[k] for k in some], [end.states[k] for k in some]
             text = f"{value_list(names, states, _VALUES)}{more} ({kind})"
-            standing = "unproved" if end.intervals is None else "proved"
+            standing: Standing = "unproved" if end.intervals is None else "proved"
             yield Fact(head=head, value=dict(zip(names, states, strict=True)), standing=standing, note=text)
     yield from _error_facts(found, steps, within)
     yield Fact(
