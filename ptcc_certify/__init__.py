@@ -19,8 +19,8 @@ The names at the top, by topic:
 - Runs: ``simulate``, ``Bounded``, ``simulate_late``, ``simulate_tracking``, ``Trajectory``
 - Certificates: ``certify``, ``Certificate``, ``Asks``, ``InitialState``, ``Expectations``, ``read_certificate``,
   ``check``
-- Bounds and design: ``final_state``, ``influence``, ``opinions_in_steps``, ``formation_of_biases``, ``box``,
-  ``ellipsoid``, ``worst_initial_state``, ``design``, ``design_agents``
+- Bounds and design: ``final_state``, ``influence``, ``formation_of_biases``, ``box``, ``ellipsoid``,
+  ``worst_initial_state``, ``design``, ``design_agents``
 - Many graphs: ``Ensemble``, ``certify_many``
 - Figures: ``plot_glance``, ``plot_influence``, ``plot_trajectory``, ``plot_decay``, ``plot_run``, ``plot_sliding``,
   ``plot_trade_off``, ``plot_input``, ``plot_effort``, ``plot_graph``, ``plot_spectrum``, ``plot_frontier``,
@@ -92,7 +92,6 @@ _EXPORTS = {
     # Bounds and design
     "final_state": "bounds.final_state.of_graph",
     "influence": "bounds.final_state.of_graph",
-    "opinions_in_steps": "bounds.final_state.in_steps",
     "formation_of_biases": "bounds.agents.formation",
     "box": "bounds.input.initial_sets",
     "ellipsoid": "bounds.input.initial_sets",

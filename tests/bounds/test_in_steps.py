@@ -16,7 +16,7 @@ from flint import fmpq, fmpq_mat
 from generators import all_classes, random_graph, smallest
 
 import ptcc_certify as ptcc
-from ptcc_certify.bounds.final_state.in_steps import period
+from ptcc_certify.bounds.final_state.in_steps import opinions_in_steps, period
 from ptcc_certify.errors import PTCCError
 from ptcc_certify.graphs.stubborn import agent_nodes
 
@@ -61,7 +61,7 @@ def matrix_of(graph: ptcc.SignedDigraph, own: dict[str, Fraction]) -> list[list[
 @pytest.mark.parametrize("seed", range(320))
 def test_ends_are_the_exact_limits_or_means_and_runs_keep_the_bound(seed: int) -> None:
     graph, own, x0 = drawn(seed)
-    found = ptcc.opinions_in_steps(graph, x0, self_weight=own or 0)
+    found = opinions_in_steps(graph, x0, self_weight=own or 0)
     A, n = matrix_of(graph, own), graph.n_nodes
     assert all(sum(map(abs, row)) == 1 for row in A)
     x, X = (
@@ -149,15 +149,15 @@ def test_the_round_of_a_group_is_that_of_its_spectrum(part: int) -> None:
 
 def test_three_mutual_enemies_alternate_although_nothing_in_them_is_in_rounds() -> None:
     enemies = [(a, b, -1) for a in (1, 2, 3) for b in (1, 2, 3) if a != b]
-    found = ptcc.opinions_in_steps(enemies, [1, 1, 1])
+    found = opinions_in_steps(enemies, [1, 1, 1])
     assert found.periods == {(0, 1, 2): 2} and not found.converges
     assert found.run(3).tolist() == [[1] * 3, [-1] * 3, [1] * 3, [-1] * 3]
-    assert ptcc.opinions_in_steps(enemies, [1, 1, 1], self_weight="1=0.1").converges  # one who keeps a share is enough
+    assert opinions_in_steps(enemies, [1, 1, 1], self_weight="1=0.1").converges  # one who keeps a share is enough
 
 
 def test_followers_of_a_group_in_rounds_do_not_settle_either() -> None:
     cycle = [("a", "b", 1), ("b", "c", 1), ("c", "a", 1), ("c", "d", 1), ("rest", "e", 1), ("e", "f", 1)]
-    found = ptcc.opinions_in_steps(cycle, dict(zip("abcdef", [3, 0, 0, 0, 0, 0], strict=True)) | {"rest": 7})
+    found = opinions_in_steps(cycle, dict(zip("abcdef", [3, 0, 0, 0, 0, 0], strict=True)) | {"rest": 7})
     assert set(found.periods.values()) == {3}
     assert {a for a, moves in zip(found.graph.labels, found.restless, strict=True) if moves} == {*"abcd"}
     assert found.final_state["d"] == 1 and found.final_state["f"] == 7
@@ -168,7 +168,7 @@ def test_followers_of_a_group_in_rounds_do_not_settle_either() -> None:
 def test_a_matrix_as_degroot_prints_it_is_taken_with_its_diagonal() -> None:
     """DeGroot (1974): two people with rows (1/2, 1/2) and (1/4, 3/4) agree on one third and two thirds."""
     two = ptcc.SignedDigraph.from_matrix([[0, "0.5"], ["0.25", 0]], orientation="listens")
-    found = ptcc.opinions_in_steps(two, [1, 0], self_weight={"1": "0.5", "2": "0.75"})
+    found = opinions_in_steps(two, [1, 0], self_weight={"1": "0.5", "2": "0.75"})
     assert found.converges and found.final_state.states == (Fraction(1, 3), Fraction(1, 3))
     assert found.influence.row(0) == {0: Fraction(1, 3), 1: Fraction(2, 3)}
 
@@ -182,7 +182,7 @@ def test_four_people_of_friedkin_and_johnsen_end_where_they_print_it() -> None:
     theta = {str(k + 1): row[k] for k, row in enumerate(exact) if k != 2}
     own = {str(k + 1): (1 - row[k]) * row[k] for k, row in enumerate(exact) if k != 2}
     debate = ptcc.with_stubborn(ptcc.SignedDigraph.from_matrix(heard, orientation="listens"), theta)
-    found = ptcc.opinions_in_steps(debate, [25, 25, 75, 85], self_weight=own)
+    found = opinions_in_steps(debate, [25, 25, 75, 85], self_weight=own)
     assert [round(float(found.final_state[k])) for k in "1234"] == [60, 60, 75, 75]
     assert np.allclose(found.run(200)[-1], [float(x) for x in found.final_state.states])
 
@@ -190,7 +190,7 @@ def test_four_people_of_friedkin_and_johnsen_end_where_they_print_it() -> None:
 @pytest.mark.parametrize("share", [1, "-0.1", "1.5", {"a": 2}, "a=x", {"z": 0}, "a=0.1,a=0.2"])
 def test_what_is_no_share_is_refused_in_one_line(share: Any) -> None:
     with pytest.raises(PTCCError) as caught:
-        ptcc.opinions_in_steps([("a", "b", 1), ("b", "a", 1)], [1, 2], self_weight=share)
+        opinions_in_steps([("a", "b", 1), ("b", "a", 1)], [1, 2], self_weight=share)
     assert "\n" not in str(caught.value)
 
 
@@ -209,7 +209,7 @@ def test_opinions_of_real_graphs_end_where_long_runs_do(name: str, real_data: Pa
     first = graph.labels[int(graph.target[0])]
     debate = ptcc.with_stubborn(graph, {first: "0.5"})
     x0 = [Fraction((7 * k) % 11 - 5) for k in range(graph.n_nodes)]
-    found = ptcc.opinions_in_steps(debate, x0, self_weight="0.1")
+    found = opinions_in_steps(debate, x0, self_weight="0.1")
     assert found.converges  # everybody keeps a share
     end = np.array([float(x) for x in found.final_state.states])
     A = np.eye(debate.n_nodes) - found.structure.graph.dense_laplacian()

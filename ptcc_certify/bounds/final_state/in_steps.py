@@ -279,7 +279,7 @@ def _shares(self_weight: Any, graph: SignedDigraph) -> list[Fraction]:
         if not 0 <= share < 1:
             mend = "give the share 0 <= s < 1 that it keeps of its own opinion; negative ones are another model"
             raise ParameterError("self_weight", f"of {shorten(label)} is {format_exact(share)}; {mend}")
-        own[place_of(label, graph.labels)] = share
+        own[graph.index[label] if label in graph.index else place_of(label, graph.labels)] = share
     return own
 
 

@@ -26,7 +26,8 @@ def steps_facts(found: OpinionsInSteps, steps: int, within: Fraction) -> Facts:
     Examples
     --------
     >>> from ptcc_certify.report.facts.in_steps import steps_facts
-    >>> found = ptcc.opinions_in_steps([("a", "b", 1), ("b", "a", 1), ("c", "d", 1)], [3, 1, 2, 5])
+    >>> from ptcc_certify.bounds.final_state.in_steps import opinions_in_steps
+    >>> found = opinions_in_steps([("a", "b", 1), ("b", "a", 1), ("c", "d", 1)], [3, 1, 2, 5])
     >>> for fact in steps_facts(found, 4, Fraction(1, 100)):
     ...     print(f"{fact.head}: {fact.text}")
     model: x(t+1) = A x(t) in steps of time; sum |a_kl| = 1
@@ -35,8 +36,7 @@ def steps_facts(found: OpinionsInSteps, steps: int, within: Fraction) -> Facts:
     ends: c=2, d=2 (exact)
     error: at most 0 after 4 steps, and 0.01 after 1 step: d, who hears, in the end, only who rests
     x(4): a=3, b=1, c=2, d=2 (a run, numerical)
-    decides: c 50 %, a 25 %, b 25 %
-    X: a, b end at 0.5 x_a + 0.5 x_b, c, d at x_c
+    decides: not told, for not everybody settles
     """
     graph, agents, end = found.graph, agent_nodes(found.graph), found.final_state
     labels = graph.labels
@@ -59,13 +59,15 @@ def steps_facts(found: OpinionsInSteps, steps: int, within: Fraction) -> Facts:
         standing="observed",
         note=f"{value_list([labels[k] for k in agents], found.run(steps)[-1][agents], _VALUES)} (a run, numerical)",
     )
+    if not found.converges:
+        yield Fact(head="decides", note="not told, for not everybody settles")
+        return
     try:
-        yield from (
-            replace(fact, head="X") if fact.head == "x(T)" else fact for fact in influence_facts(found.influence)
-        )
+        for fact in influence_facts(found.influence):
+            yield replace(fact, head="X") if fact.head == "x(T)" else fact
     except ParameterError as error:  # too many weights
         yield Fact(head="decides", note=f"not told: {error}")
-    if end.exact and found.converges:
+    if end.exact:
         begin = found.initial_state
         values = {f.__name__: [f(graph, begin), f(graph, end.states)] for f in (polarisation, disagreement)}
         text = ", ".join(f"{name} {short_number(x)} -> {short_number(y)}" for name, (x, y) in values.items())
