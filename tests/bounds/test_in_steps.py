@@ -217,6 +217,24 @@ def test_opinions_of_real_graphs_end_where_long_runs_do(name: str, real_data: Pa
     assert len(agent_nodes(debate)) == graph.n_nodes
 
 
+def test_ends_of_many_agents_are_in_proved_intervals_and_runs_keep_the_bound() -> None:
+    """400 agents, above what is exact: every tenth is stubborn, opponents are a third."""
+    rng = np.random.default_rng(3)
+    edges = [
+        (f"n{s}", f"n{t}", int(rng.choice([1, 2, -1])))
+        for t in range(400)
+        for s in rng.choice(400, 5, replace=False).tolist()
+        if s != t
+    ]
+    debate = ptcc.with_stubborn(edges, {f"n{k}": 2 for k in range(0, 400, 10)})
+    found = opinions_in_steps(debate, [Fraction(int(x), 10) for x in rng.integers(-50, 51, 400)])
+    assert found.converges and found.decay is not None and found.final_state.radius is not None
+    errors = np.abs(found.run(60) - np.array([float(x) for x in found.final_state.states]))
+    for step in (0, 1, 5, 20, 60):
+        assert errors[step].max() <= float(found.decay.after(step)) * (1 + 1e-9)
+    assert errors[min(60, found.decay.steps(Fraction(1, 10)))].max() <= 0.1
+
+
 # ---------------------------------------------------------------------- on the command line
 
 
