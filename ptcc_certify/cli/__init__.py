@@ -31,6 +31,7 @@ from ptcc_certify.cli import (
     explore,
     influence,
     new,
+    opinions,
     plot,
     simulate,
 )
@@ -60,6 +61,7 @@ GROUPS: dict[str, dict[click.Command, str]] = {
         classify.classify: "Tell its structure and the theorem that applies.",
         certify.certify: "Prove what the protocol does on it; write a certificate.",
         influence.influence: "Tell who decides where everybody ends.",
+        opinions.opinions: "Tell what becomes of opinions in steps of time.",
         simulate.simulate: "Run the protocol: a table, or a figure of the states.",
         compare.compare: "Compare it with protocols that have no deadline.",
         design.design: "Find gains and a deadline that keep the input within limits.",
