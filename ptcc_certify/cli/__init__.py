@@ -20,6 +20,7 @@ import click
 
 from ptcc_certify.cli import (
     animate,
+    balance,
     batch,
     certify,
     check_and_report,
@@ -59,6 +60,7 @@ GROUPS: dict[str, dict[click.Command, str]] = {
         classify.classify: "Tell its structure and the theorem that applies.",
         certify.certify: "Prove what the protocol does on it; write a certificate.",
         influence.influence: "Tell who decides where everybody ends.",
+        balance.balance: "Tell how far from balance it is, and which edges spoil it.",
         simulate.simulate: "Run the protocol: a table, or a figure of the states.",
         design.design: "Find gains and a deadline that keep the input within limits.",
         batch.batch: "Certify many graphs: one table.",

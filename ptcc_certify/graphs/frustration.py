@@ -21,6 +21,8 @@ camps together, so that they are one *tie* here.
 
 from __future__ import annotations
 
+import csv
+import io
 import math
 import time
 from collections.abc import Iterable, Iterator, Sequence
@@ -136,6 +138,48 @@ class FrustrationIndex(ReadOnly):
         """What all edges count or weigh together."""
         ties = _Ties(self.graph, self.by, self.undirected)
         return Fraction(sum(ties.weight.tolist()), ties.scale)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what JSON can hold: numbers as exact texts, nodes by their labels.
+
+        Examples
+        --------
+        >>> frustration_index([("a", "b", 1), ("b", "a", -1)]).to_dict()["cycles"]
+        [{'nodes': ['a', 'b'], 'signs': [1, -1], 'share': '1'}]
+        """
+        labels = self.graph.labels
+        cycles = [
+            {"nodes": [labels[k] for k in cycle.nodes], "signs": list(cycle.signs), "share": str(cycle.share)}
+            for cycle in self.cycles
+        ]
+        return {
+            "by": self.by,
+            "undirected": self.undirected,
+            "lower": str(self.lower),
+            "upper": str(self.upper),
+            "exact": self.exact,
+            "reported": self.reported,
+            "camps": dict(zip(labels, self.camps.tolist(), strict=True)),
+            "edges": self._rows(),
+            "cycles": cycles,
+        }
+
+    def to_csv(self) -> str:
+        """Return CSV ``source,target,weight``, one row for each edge that disagrees with the camps.
+
+        Examples
+        --------
+        >>> print(frustration_index([("a", "b", 1), ("b", "a", "-0.5")], by="weight").to_csv(), end="")
+        source,target,weight
+        b,a,-0.5
+        """
+        text = io.StringIO()
+        csv.writer(text, lineterminator="\n").writerows([("source", "target", "weight"), *self._rows()])
+        return text.getvalue()
+
+    def _rows(self) -> list[list[str]]:
+        graph, texts = self.graph, self.graph.weight_texts
+        return [[graph.labels[graph.source[e]], graph.labels[graph.target[e]], texts[e]] for e in self.edges]
 
     def __repr__(self) -> str:
         value = str(self.lower) if self.exact else f"from {down(self.lower)} to {up(self.upper)}"
