@@ -49,6 +49,8 @@ _SHORTER, _STEP = 1e-6, 1e-9
 _BATCH, _NEW_CYCLES = 64, 2000
 #: Shares are rounded to fractions of so small a denominator, of the unit in which all weights are integers.
 _DENOMINATOR = 60
+#: Bits of the common denominator of all weights: more than those of all floats.
+_SCALE_BITS = 4000
 
 
 @dataclass(frozen=True)
@@ -214,7 +216,7 @@ def frustration_index(
     Raises
     ------
     ParameterError
-        ``by`` is something else, or the time limit is not positive.
+        ``by`` is something else, the time limit is not positive, or the common denominator of the weights is too long.
 
     References
     ----------
@@ -227,9 +229,9 @@ def frustration_index(
     FrustrationIndex(7, by count of pairs; 14 edges to remove, 7 negative cycles)
     """
     if by not in ("count", "weight"):
-        raise ParameterError("by", f' = {by!r}: give "count" or "weight"')
+        raise ParameterError("by", f'= {by!r}: give "count" or "weight"')
     if not time_limit > 0:
-        raise ParameterError("time_limit", f" = {time_limit!r}: seconds must be positive")
+        raise ParameterError("time_limit", f"= {time_limit!r}: seconds must be positive")
     structure = analyse(graph, orientation)
     ties = _Ties(structure.graph, by, structure.undirected)
     end = time.monotonic() + time_limit
@@ -266,7 +268,12 @@ class _Ties:
         sizes = [Fraction(1)] * len(which)
         if by == "weight":
             sizes = [abs(graph.exact_weight(edge)) for edge in range(len(which))]
-        self.scale = math.lcm(*{size.denominator for size in sizes})
+        self.scale = 1
+        for denominator in {size.denominator for size in sizes}:
+            self.scale = math.lcm(self.scale, denominator)
+            if self.scale.bit_length() > _SCALE_BITS:
+                mend = f'have no common denominator of {_SCALE_BITS} bits; round them, or give "count"'
+                raise ParameterError("by", f'= "weight": the weights {mend}')
         weight = [0] * len(self.keys)
         for tie, size in zip(which.tolist(), sizes, strict=True):
             weight[tie] += int(size * self.scale)
@@ -297,7 +304,9 @@ class _Ties:
     def cycle(self, ties: Sequence[int], share: Fraction) -> NegativeCycle:
         """Return the cycle that runs through ties in their order, which must close and be negative."""
         ends = [(int(self.low[tie]), int(self.high[tie])) for tie in ties]
-        begin = ends[0][0] if ends[0][0] in ends[-1] and (len(ends) == 2 or ends[0][1] in ends[1]) else ends[0][1]
+        if len(ends) < 2:
+            raise ArithmeticError("a cycle has at least two ties")
+        begin = ends[0][0] if ends[0][1] in ends[1] else ends[0][1]
         nodes = [begin]
         for low, high in ends:
             if nodes[-1] not in (low, high):
