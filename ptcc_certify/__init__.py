@@ -10,7 +10,7 @@ cert.save("certificate.json")
 The names at the top, by topic:
 
 - Graphs: ``SignedDigraph``, ``as_graph``, ``as_state``, ``read_graph``, ``write_graph``, ``with_stubborn``,
-  ``analyse``, ``Structure``, ``frustration_index``
+  ``analyse``, ``Structure``
 - Families of graphs: ``Family``, ``as_family``, ``read_family``, ``decide``, ``DwellTime``, ``JointWindows``,
   ``ClockShares``
 - Protocols, disturbances, actuators: ``Agents``, ``companion_form``, ``NominalProtocol``, ``SlidingModeProtocol``,
@@ -54,7 +54,6 @@ _EXPORTS = {
     "write_graph": "graphs.io",
     "analyse": "graphs.structure",
     "Structure": "graphs.structure",
-    "frustration_index": "graphs.frustration",
     # Families of graphs
     "Family": "graphs.family",
     "as_family": "graphs.io",

@@ -72,7 +72,7 @@ class NegativeCycle:
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.frustration import NegativeCycle
+    >>> from ptcc_certify.graphs.frustration import NegativeCycle, frustration_index
     >>> frustration_index([("a", "b", 1), ("b", "a", -1)]).cycles
     (NegativeCycle(nodes=(0, 1), signs=(1, -1), share=Fraction(1, 1)),)
     """
@@ -111,7 +111,7 @@ class FrustrationIndex(ReadOnly):
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.frustration import FrustrationIndex
+    >>> from ptcc_certify.graphs.frustration import FrustrationIndex, frustration_index
     >>> F = frustration_index([("a", "b", 1), ("b", "c", 1), ("c", "a", -2)])
     >>> isinstance(F, FrustrationIndex), F.exact, [F.graph.edges[e] for e in F.edges]
     (True, True, [('c', 'a', Fraction(-2, 1))])
@@ -146,6 +146,7 @@ class FrustrationIndex(ReadOnly):
 
         Examples
         --------
+        >>> from ptcc_certify.graphs.frustration import frustration_index
         >>> frustration_index([("a", "b", 1), ("b", "a", -1)]).to_dict()["cycles"]
         [{'nodes': ['a', 'b'], 'signs': [1, -1], 'share': '1'}]
         """
@@ -171,6 +172,7 @@ class FrustrationIndex(ReadOnly):
 
         Examples
         --------
+        >>> from ptcc_certify.graphs.frustration import frustration_index
         >>> print(frustration_index([("a", "b", 1), ("b", "a", "-0.5")], by="weight").to_csv(), end="")
         source,target,weight
         b,a,-0.5
@@ -225,6 +227,7 @@ def frustration_index(
 
     Examples
     --------
+    >>> from ptcc_certify.graphs.frustration import frustration_index
     >>> frustration_index("highland_tribes")
     FrustrationIndex(7, by count of pairs; 14 edges to remove, 7 negative cycles)
     """

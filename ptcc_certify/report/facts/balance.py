@@ -22,10 +22,11 @@ def distance_fact(found: FrustrationIndex, detail: bool = False) -> Fact:
 
     Examples
     --------
+    >>> from ptcc_certify.graphs.frustration import frustration_index
     >>> from ptcc_certify.report.facts.balance import distance_fact
-    >>> distance_fact(ptcc.frustration_index([("a", "b", 1), ("b", "a", -2)])).text
+    >>> distance_fact(frustration_index([("a", "b", 1), ("b", "a", -2)])).text
     'frustration index 1 of 2 arcs (proved)'
-    >>> distance_fact(ptcc.frustration_index([("a", "b", 1), ("b", "a", 2)])).text
+    >>> distance_fact(frustration_index([("a", "b", 1), ("b", "a", 2)])).text
     'the graph is balanced: frustration index 0'
     """
     if not found.upper:
@@ -43,8 +44,10 @@ def balance_facts(found: FrustrationIndex, group: bool = False) -> Facts:
 
     Examples
     --------
+    >>> from ptcc_certify.graphs.frustration import frustration_index
     >>> from ptcc_certify.report.facts.balance import balance_facts
-    >>> print(*(fact.text for fact in balance_facts(ptcc.frustration_index([("a", "b", 1), ("b", "a", -2)]))), sep="\n")
+    >>> found = frustration_index([("a", "b", 1), ("b", "a", -2)])
+    >>> print(*(fact.text for fact in balance_facts(found)), sep="\n")
     frustration index 1 of 2 arcs (proved)
     1 edge: b -> a
     {a, b} without it
