@@ -28,7 +28,7 @@ from ptcc_certify.errors import ExitCode, ParameterError
 @click.option(
     "--time-limit",
     type=click.FloatRange(min=0, min_open=True),
-    default=20.0,
+    default=30.0,
     metavar="SECONDS",
     help="For the searches together; what they found by then is told.",
 )

@@ -41,8 +41,8 @@ from ptcc_certify.graphs.structure import analyse, find_camps
 
 #: The ties of a cycle, one after the other.
 Cycle = tuple[int, ...]
-#: Ties up to which an integer program is asked, and steps of tabu search per node.
-_INTEGER_TIES, _STEPS = 3000, 30
+#: Steps of tabu search per node.
+_STEPS = 30
 #: By how much a cycle must be shorter than 1 to be new, and the length of a tie that costs nothing.
 _SHORTER, _STEP = 1e-6, 1e-9
 #: Nodes from which shortest paths are found at once, and new cycles after which the linear program is solved again.
@@ -193,7 +193,7 @@ class FrustrationIndex(ReadOnly):
 
 
 def frustration_index(
-    graph: Any, by: Literal["count", "weight"] = "count", time_limit: float = 20.0, orientation: str | None = None
+    graph: Any, by: Literal["count", "weight"] = "count", time_limit: float = 30.0, orientation: str | None = None
 ) -> FrustrationIndex:
     r"""Bound the frustration index, the distance from balance: ``F = min_g sum { 1 : w_kl g_k g_l < 0 }``.
 
@@ -340,7 +340,7 @@ class _Search:
         self.unit = Fraction(upper, number)  # no tie of a packing is used for more than F, so that larger ones are as F
         self.cost = np.array([float(Fraction(min(weight, upper)) / self.unit) for weight in ties.weight])
         self._disjoint_cycles()
-        if self._pack() and not self._met() and len(ties.weight) <= _INTEGER_TIES:
+        if self._pack() and not self._met():
             self._integer_program()
 
     def _left(self) -> float:
