@@ -7,13 +7,12 @@ from typing import Any, Literal
 
 import click
 
-from ptcc_certify.cli.click_options import Command
 from ptcc_certify.cli.options import graph_argument, json_option, read, reading_options
 from ptcc_certify.cli.terminal import Screen, print_json, progress, refuse_output, screen_options
 from ptcc_certify.errors import ExitCode, ParameterError
 
 
-@click.command(cls=Command)
+@click.command()
 @graph_argument
 @click.option(
     "-o", "--output", type=click.Path(dir_okay=False), help="Write the edges that spoil it to this .csv file."
