@@ -61,6 +61,7 @@ IN_ROOMS = {
     "checker": ("CheckReport",),
     "checker.input_formulas": ("InitialSet",),
     "gain_design.answer": ("Design",),
+    "graphs.frustration": ("frustration_index", "FrustrationIndex", "NegativeCycle"),
     "report.page": ("report_html",),
     "report.statement": ("report_latex",),
 }

@@ -77,7 +77,9 @@ def test_no_line_of_a_formula_begins_like_a_point_of_a_list(page: Path):
 
 
 @pytest.mark.few(0)
-@pytest.mark.parametrize("page", ["guide/answer.md", "guide/influence.md", "guide/input.md", "guide/agents.md"])
+@pytest.mark.parametrize(
+    "page", ["guide/answer.md", "guide/balance.md", "guide/influence.md", "guide/input.md", "guide/agents.md"]
+)
 def test_transcripts_are_what_ptcc_prints(page: str):
     assert check_transcripts((ROOT / "docs" / page).read_text(encoding="utf-8"))
 

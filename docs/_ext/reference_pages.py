@@ -13,7 +13,10 @@ from ptcc_certify.cli import cli
 
 #: The rooms of ``ptcc_certify`` in the order of their use: title, and modules whose further names are listed too.
 ROOMS = {
-    "graphs": ("Graphs and their structure", "graphs.digraph graphs.io graphs.structure graphs.ensembles"),
+    "graphs": (
+        "Graphs and their structure",
+        "graphs.digraph graphs.io graphs.structure graphs.frustration graphs.ensembles",
+    ),
     "model": (
         "What is asked of what: protocols, agents, messages, disturbances",
         "model model.gain model.disturbance model.reaching_time model.asks",

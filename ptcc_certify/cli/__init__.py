@@ -20,6 +20,7 @@ import click
 
 from ptcc_certify.cli import (
     animate,
+    balance,
     batch,
     certify,
     check_and_report,
@@ -62,6 +63,7 @@ GROUPS: dict[str, dict[click.Command, str]] = {
         certify.certify: "Prove what the protocol does on it; write a certificate.",
         influence.influence: "Tell who decides where everybody ends.",
         opinions.opinions: "Tell what becomes of opinions in steps of time.",
+        balance.balance: "Tell how far from balance it is, and which edges spoil it.",
         simulate.simulate: "Run the protocol: a table, or a figure of the states.",
         compare.compare: "Compare it with protocols that have no deadline.",
         design.design: "Find gains and a deadline that keep the input within limits.",

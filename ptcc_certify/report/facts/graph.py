@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
@@ -233,16 +233,22 @@ def leaders_text(component: ClosedComponent, labels: Sequence[str], width: int =
         more = ", ..." if len(component.negative_cycle) > 12 else ""
         return f"{shorten_list(nodes, 2 * width)}: unbalanced, negative cycle {steps}{more}"
     sides = camps(component)
-    return f"balanced, {'camps ' if len(sides) > 1 else 'one camp '}{_against(sides, labels, width)}"
+    return f"balanced, {'camps ' if len(sides) > 1 else 'one camp '}{against(sides, labels, width)}"
 
 
 def camps(component: ClosedComponent) -> list[list[int]]:
     """Return the camps of a balanced leader group, the one of its first node first."""
-    return _sides(component.nodes, component.gauge or ())
+    return sides_of(component.nodes, component.gauge or ())
 
 
-def _sides(nodes: Sequence[int], gauge: Sequence[int]) -> list[list[int]]:
-    """Split nodes by their signs, those that have +1 first."""
+def sides_of(nodes: Sequence[int], gauge: Sequence[int]) -> list[list[int]]:
+    """Split nodes by their signs, those that have +1 first.
+
+    Examples
+    --------
+    >>> sides_of([4, 5, 6], [1, -1, 1])
+    [[4, 6], [5]]
+    """
     both = ([v for v, g in zip(nodes, gauge, strict=True) if g == sign] for sign in (1, -1))
     return [camp for camp in both if camp]
 
@@ -251,14 +257,21 @@ def _camps_of_all(structure: Structure) -> Facts:
     """Tell the two camps of a connected graph that is balanced as a whole, followers among them."""
     if structure.gauge is None or len(structure.components) > 1:
         return
-    sides = _sides(range(structure.graph.n_nodes), structure.gauge.tolist())
+    sides = sides_of(range(structure.graph.n_nodes), structure.gauge.tolist())
     if len(sides) > 1:
-        long, short = (_against(sides, structure.graph.labels, width) for width in (_LONG_LIST, TEXT // 2 - 6))
+        long, short = (against(sides, structure.graph.labels, width) for width in (_LONG_LIST, TEXT // 2 - 6))
         yield Fact(head="camps", note=f"of all {long}", brief=(f"of all {short}",))
 
 
-def _against(sides: Sequence[Sequence[int]], labels: Sequence[str], width: int) -> str:
-    """Write camps against each other."""
+def against(sides: Sequence[Sequence[int]], labels: Sequence[str], width: int) -> str:
+    """Write camps against each other.
+
+    Examples
+    --------
+    >>> from ptcc_certify.errors import unlabelled
+    >>> unlabelled(against([[0], [1, 2]], "abc", 40))
+    '{a} against {b, c}'
+    """
     return " against ".join("{" + shorten_list([labelled(labels[v]) for v in camp], width) + "}" for camp in sides)
 
 
@@ -288,10 +301,10 @@ def remarks_on(structure: Structure) -> list[str]:
     return [*(text for holds, text in remarks if holds), *read["notes"]]
 
 
-def structure_facts(structure: Structure, name: str) -> list[Fact]:
-    """Return what is told of a graph alone: its structure, and what follows from it."""
+def structure_facts(structure: Structure, name: str, more: Iterable[Fact] = ()) -> list[Fact]:
+    """Return what is told of a graph alone: its structure, more of it, and what follows from it."""
     claims = structure_claims(structure, [component.claim for component in structure.components])
-    return [*graph_facts(structure, name), *leader_facts(structure), *claims]
+    return [*graph_facts(structure, name), *leader_facts(structure), *more, *claims]
 
 
 def decision_facts(
