@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.click_options import Command, exact_number, one_of, options_for, together
+from ptcc_certify.cli.click_options import exact_number, one_of, options_for, together
 from ptcc_certify.cli.terminal import Screen, print_json, progress, screen_options
 from ptcc_certify.errors import ExitCode
 from ptcc_certify.model import NominalProtocol
@@ -17,7 +17,7 @@ from ptcc_certify.model.asks import Asks, InitialState, Run
 _nominal = together(options_for(NominalProtocol), one_of(InitialState, "x0", default="random"), one_of(Run, "seed"))
 
 
-@click.command(cls=Command)
+@click.command()
 @shared.graph_argument
 @_nominal
 @shared.prejudice_option

@@ -10,13 +10,13 @@ from typing import Any
 import click
 
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.click_options import Command, exact_number, one_of
+from ptcc_certify.cli.click_options import exact_number, one_of
 from ptcc_certify.cli.terminal import Screen, print_json, progress, refuse_output, screen_options
 from ptcc_certify.errors import ExitCode, ParameterError
 from ptcc_certify.model.asks import InitialState, Run
 
 
-@click.command(cls=Command)
+@click.command()
 @shared.graph_argument
 @one_of(InitialState, "x0", default="random")
 @one_of(Run, "seed")

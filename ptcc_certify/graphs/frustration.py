@@ -113,8 +113,8 @@ class FrustrationIndex(ReadOnly):
     --------
     >>> from ptcc_certify.graphs.frustration import FrustrationIndex, frustration_index
     >>> F = frustration_index([("a", "b", 1), ("b", "c", 1), ("c", "a", -2)])
-    >>> isinstance(F, FrustrationIndex), F.exact, [F.graph.edges[e] for e in F.edges]
-    (True, True, [('c', 'a', Fraction(-2, 1))])
+    >>> isinstance(F, FrustrationIndex), F.exact, len(F.edges)
+    (True, True, 1)
     """
 
     graph: SignedDigraph
@@ -175,7 +175,7 @@ class FrustrationIndex(ReadOnly):
         >>> from ptcc_certify.graphs.frustration import frustration_index
         >>> print(frustration_index([("a", "b", 1), ("b", "a", "-0.5")], by="weight").to_csv(), end="")
         source,target,weight
-        b,a,-0.5
+        b,a,-1/2
         """
         text = io.StringIO()
         csv.writer(text, lineterminator="\n").writerows([("source", "target", "weight"), *self._rows()])
